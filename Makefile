@@ -1,0 +1,58 @@
+# Roller: `make train` trains an agent, `make test` runs the tests. `make help` lists the rest.
+# Everything is installed into .venv with pip; no step needs root.
+
+PYTHON ?= python3
+NAME   ?= classic
+CONFIG ?= configs/ppo_classic.yaml
+SEED   ?= 0
+ARGS   ?=
+
+VENV   := .venv
+BIN    := $(VENV)/bin
+# Newer than both files it depends on exactly when the environment is complete.
+READY  := $(VENV)/.ready
+
+.DEFAULT_GOAL := help
+.PHONY: help setup train test lint format clean
+.DELETE_ON_ERROR:
+
+help: ## show this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' Makefile
+	@echo
+	@echo "  make train NAME=$(NAME) SEED=$(SEED) CONFIG=$(CONFIG) ARGS=\"\""
+	@echo "  make test ARGS=\"-k gate\""
+
+setup: $(READY) ## make .venv with the pinned packages of constraints.txt
+
+$(READY): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
+		|| { echo "Roller needs Python >= 3.11, but $(PYTHON) is $$($(PYTHON) --version 2>&1);" \
+		          "say 'make $(MAKECMDGOALS) PYTHON=python3.12'" >&2; exit 1; }
+	@echo "Setting up $(VENV) from constraints.txt (once; a few minutes at most) ..."
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
+		--constraint constraints.txt hatchling editables
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
+		--constraint constraints.txt --no-build-isolation --editable '.[train,dev]'
+	@touch $(READY)
+	@echo "$(VENV) is ready."
+
+train: $(READY) ## train, evaluate and draw; continues an unfinished run of the same NAME
+	@$(BIN)/python scripts/train.py --config $(CONFIG) --name $(NAME) --seed $(SEED) --resume $(ARGS)
+
+test: $(READY) ## run the tests on all processors
+	@$(BIN)/python -m pytest --numprocesses auto $(ARGS)
+
+lint: $(READY) ## check style, types and the direction of imports
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(READY) ## let ruff format the code and mend what it can
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+clean: ## remove .venv and caches; runs/ stays
+	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,1 @@
+"""Level -> MuJoCo, and nothing a scene does not need."""

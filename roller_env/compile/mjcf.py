@@ -1,0 +1,184 @@
+"""Level -> MjSpec, one small function a piece.
+
+What the physics needs and no more: the ball on its free joint, static boxes on the world body, one
+slide joint and one servo for each plate and gate, three motors on the ball. Coins, triggers and
+the finish are decided by the rules on the ball's path and do not exist here.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from roller_env.compile.merge import merge_solids
+from roller_env.level.expand import Solid, rotation_matrix, solids
+from roller_env.level.schema import Gate, Level, LiftPad, Material, Plate
+from roller_env.physics.materials import contact_parameters
+from roller_env.physics.presets import PhysicsPreset
+
+BALL: Final = "ball"
+FORCE_ACTUATORS: Final = ("force_x", "force_y", "lift")
+"""Motors on the ball's free joint: newtons along the world's x, y and z through its centre."""
+
+BALL_BIT: Final = 1
+"""Contact bit of the ball's contype and of the level's conaffinity: only pairs of the ball and a
+piece of the level meet; level pieces, gates and plates among themselves never do."""
+
+MOVER_MASS_RATIO: Final = 100.0
+"""Mass of a plate or gate over the ball's, so that the ball's landing does not budge it."""
+
+SERVO_FREQUENCY: Final = 200.0
+"""Natural frequency of the plates' and gates' servos, rad/s. They trail their set-point by
+2 speed / frequency (8 mm for a gate) and implicitfast is stable up to dt = 4.8 / frequency."""
+
+SCRIPT_RATE_HZ: Final = 60.0
+"""Nominal rate of the original's script loops."""
+
+
+def build_spec(level: Level, preset: PhysicsPreset) -> mujoco.MjSpec:
+    """Return the level as an MjSpec that simulates and carries no scenery."""
+    spec = mujoco.MjSpec()
+    spec.modelname = level.name
+    _set_options(spec, level, preset)
+    _add_ball(spec, level)
+    for number, solid in enumerate(merge_solids(solids(level))):
+        _add_solid(spec, level, preset, solid, number)
+    for pad_number, pad in enumerate(level.lift_pads):
+        _add_lift_pad(spec, level, preset, pad, pad_number)
+    for plate in level.plates:
+        _add_mover(spec, level, preset, plate, plate.sinks_to, 0.0)
+    for gate in level.gates:
+        _add_mover(spec, level, preset, gate, gate.lowers_to, gate.yaw_deg)
+    return spec
+
+
+def _set_options(spec: mujoco.MjSpec, level: Level, preset: PhysicsPreset) -> None:
+    option = spec.option
+    option.timestep = preset.dt_s
+    option.gravity = [0.0, 0.0, -level.gravity]
+    option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{preset.integrator.upper()}")
+    option.cone = getattr(mujoco.mjtCone, f"mjCONE_{preset.cone.upper()}")
+    option.impratio = preset.impratio
+    option.iterations = preset.iterations
+    option.tolerance = preset.tolerance
+    # MuJoCo 4.0.0's sparse Newton Hessian is wrong (fixed in 4.0.1), and "auto" may choose it.
+    option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    # A diverging ball must be seen and ended by the simulation, not silently put back.
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+
+
+def _add_ball(spec: mujoco.MjSpec, level: Level) -> None:
+    body = spec.worldbody.add_body(name=BALL, pos=level.start.at)
+    body.add_freejoint(name=BALL)
+    body.add_geom(
+        name=BALL,
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[level.ball.radius, 0.0, 0.0],
+        mass=level.ball.mass_kg,
+        contype=BALL_BIT,
+        conaffinity=0,
+        condim=3,
+    )
+    for name, axis in zip(FORCE_ACTUATORS, np.eye(3), strict=True):
+        motor = spec.add_actuator(
+            name=name,
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            target=BALL,
+            gear=[*axis, 0.0, 0.0, 0.0],
+        )
+        motor.set_to_motor()
+
+
+def _contact(level: Level, preset: PhysicsPreset, material: Material) -> dict[str, object]:
+    """Return the geom attributes that give the ball the wanted contact with ``material``.
+
+    The geom's priority is above the ball's, so its numbers count alone, not a mix of both.
+    """
+    parameters = contact_parameters(
+        friction=level.ball.friction * material.friction,
+        elasticity=level.ball.elasticity * material.elasticity,
+        dt_s=preset.dt_s,
+    )
+    return {
+        "contype": 0,
+        "conaffinity": BALL_BIT,
+        "priority": 1,
+        "condim": 3,
+        "friction": [parameters.friction, 0.0, 0.0],
+        "solref": parameters.solref,
+        "solimp": parameters.solimp,
+    }
+
+
+def _add_solid(
+    spec: mujoco.MjSpec, level: Level, preset: PhysicsPreset, solid: Solid, number: int
+) -> None:
+    spec.worldbody.add_geom(
+        name=f"solid_{number}_{solid.material}",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=solid.half_size,
+        pos=solid.centre,
+        quat=_quaternion(np.array(solid.rotation)),
+        **_contact(level, preset, level.material(solid.material)),
+    )
+
+
+def _add_lift_pad(
+    spec: mujoco.MjSpec, level: Level, preset: PhysicsPreset, pad: LiftPad, number: int
+) -> None:
+    spec.worldbody.add_geom(
+        name=f"lift_pad_{number}",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[edge / 2 for edge in pad.size],
+        pos=pad.at,
+        **_contact(level, preset, Material()),
+    )
+
+
+def _add_mover(
+    spec: mujoco.MjSpec,
+    level: Level,
+    preset: PhysicsPreset,
+    piece: Plate | Gate,
+    stop_m: float,
+    yaw_deg: float,
+) -> None:
+    """Add a slab that an integrated-velocity servo moves down its slide joint to ``stop_m``.
+
+    The servo's control is the slab's velocity in m/s; its activation is the set-point, clamped
+    where the original stops. The original tests ``z > stop`` before each decrement, so it ends up
+    to one frame of travel below the stop: the clamp lies half a frame below, on average the same,
+    and the slab does pass the stop.
+    """
+    travel = stop_m - 0.5 * piece.speed / SCRIPT_RATE_HZ - piece.at[2]
+    mass = MOVER_MASS_RATIO * level.ball.mass_kg
+    kp = mass * SERVO_FREQUENCY**2
+    body = spec.worldbody.add_body(
+        name=piece.name,
+        pos=piece.at,
+        quat=_quaternion(np.array(rotation_matrix(yaw_deg))),
+        gravcomp=1.0,
+    )
+    body.add_joint(name=piece.name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0.0, 0.0, 1.0])
+    body.add_geom(
+        name=piece.name,
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[edge / 2 for edge in piece.size],
+        mass=mass,
+        **_contact(level, preset, Material()),
+    )
+    servo = spec.add_actuator(
+        name=piece.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=piece.name
+    )
+    servo.set_to_intvelocity(kp=kp, kv=2.0 * mass * SERVO_FREQUENCY)
+    servo.actlimited = True
+    servo.actrange = [travel, 0.0]
+
+
+def _quaternion(rotation: np.ndarray) -> np.ndarray:
+    """Return the unit quaternion (w, x, y, z) of a rotation matrix (3, 3)."""
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, rotation.reshape(9))
+    return quaternion

@@ -1,0 +1,383 @@
+"""What pictures need and the physics does not: surfaces, colours, sky, lights, coins, the finish.
+
+`add_scenery` changes a spec that `roller_env.compile.mjcf.build_spec` made. Everything it adds is
+without mass and touches nothing, and no joint is added, so that the positions (``qpos``) of a
+simulation can be put into the scenery's model as they are. What moves or changes its colour while
+playing has a name made by `part`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+
+from roller_env.compile import textures
+from roller_env.compile.merge import merge_solids
+from roller_env.compile.mjcf import BALL, build_spec
+from roller_env.compile.surfaces import Surface, box_surface, full_turn, lathe, tube_surface
+from roller_env.level.expand import Solid, coin_positions, solids, tube_frame
+from roller_env.level.schema import Gate, Level, LiftPad, Plate
+from roller_env.physics.presets import PhysicsPreset
+from roller_env.units import quants
+
+IDLE: Final = "idle"
+ACTIVE: Final = "active"
+DONE: Final = "done"
+"""Names of the materials in which plates, gates and pads tell their state."""
+
+SPARKS: Final = 38
+"""Particles of the finish alive at once: one a frame of 1/60 s, 0.625 s long."""
+
+RING_SPACING_M: Final = quants(96.0)
+"""Distance between the bands that run along a tube."""
+
+_HIDDEN_GROUP: Final = 4
+"""Geoms of the physics that a surface is drawn for; MuJoCo leaves this group out by default."""
+
+_SCENERY_GROUP: Final = 1
+
+_COIN_RADIUS_M: Final = quants(11.0)
+_COIN_HALF_THICKNESS_M: Final = quants(2.0)
+_DETAILED_COINS: Final = 500
+"""A level with more coins than this has plainer ones, or drawing would take seconds."""
+
+
+def part(kind: str, *numbers: int) -> str:
+    """Return the name of a piece of scenery; no piece of a level can be called so."""
+    return "/".join([kind, *map(str, numbers)]) + "/"
+
+
+def build_scenery(level: Level, preset: PhysicsPreset) -> mujoco.MjModel:
+    """Return the model to draw ``level`` with; its ``qpos`` is that of the physics' model."""
+    spec = build_spec(level, preset)
+    add_scenery(spec, level)
+    return spec.compile()
+
+
+def add_scenery(spec: mujoco.MjSpec, level: Level) -> None:
+    """Add to the level's spec what pictures of it need."""
+    _set_view(spec)
+    _add_sky_and_sun(spec)
+    _add_state_materials(spec)
+    _add_ground(spec, level)
+    _paint_ball(spec)
+    _add_tubes(spec, level)
+    for plate in level.plates:
+        _dress_plate(spec, plate)
+    for gate in level.gates:
+        _dress_gate(spec, gate)
+    for number, pad in enumerate(level.lift_pads):
+        _dress_pad(spec, pad, number)
+    _add_coins(spec, level)
+    _add_triggers(spec, level)
+    _add_finish(spec, level)
+
+
+def _add(body: Any, name: str, **attributes: Any) -> Any:
+    """Add a geom that is only seen."""
+    return body.add_geom(
+        name=name, contype=0, conaffinity=0, mass=0.0, group=_SCENERY_GROUP, **attributes
+    )
+
+
+def _add_material(
+    spec: mujoco.MjSpec,
+    name: str,
+    colour: str = "#ffffff",
+    *,
+    texture: str | None = None,
+    emission: float = 0.0,
+    specular: float = 0.2,
+    shininess: float = 0.3,
+) -> None:
+    rgb, alpha = textures.parse_colour(colour)
+    material = spec.add_material(
+        name=name,
+        rgba=[*rgb, alpha],
+        emission=emission,
+        specular=specular,
+        shininess=shininess,
+    )
+    if texture is not None:
+        material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = texture
+
+
+def _set_view(spec: mujoco.MjSpec) -> None:
+    visual = spec.visual
+    # Distances below are given in metres: MuJoCo takes them in extents of the model.
+    spec.stat.extent = 1.0
+    visual.map.znear = 0.05
+    visual.map.zfar = 1_000.0
+    visual.headlight.ambient = [0.34, 0.36, 0.40]
+    visual.headlight.diffuse = [0.10, 0.10, 0.10]
+    visual.headlight.specular = [0.0, 0.0, 0.0]
+    visual.quality.shadowsize = 2048
+
+
+def _add_sky_and_sun(spec: mujoco.MjSpec) -> None:
+    textures.add_texture(spec, "sky/", "skybox", textures.sky_pixels())
+    spec.worldbody.add_light(
+        name="sun/",
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        dir=[0.42, -0.30, -0.86],
+        castshadow=True,
+        diffuse=[0.72, 0.69, 0.62],
+        ambient=[0.0, 0.0, 0.0],
+        specular=[0.5, 0.5, 0.45],
+    )
+    spec.worldbody.add_light(
+        name="sky light/",
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        dir=[-0.5, 0.6, 0.35],
+        castshadow=False,
+        diffuse=[0.16, 0.20, 0.28],
+        ambient=[0.0, 0.0, 0.0],
+        specular=[0.0, 0.0, 0.0],
+    )
+
+
+def _add_state_materials(spec: mujoco.MjSpec) -> None:
+    _add_material(spec, "plate/" + IDLE, "#ffb02e", emission=0.25)
+    _add_material(spec, "plate/" + ACTIVE, "#ff6a3d", emission=0.7)
+    _add_material(spec, "plate/" + DONE, "#43d17c", emission=0.5)
+    _add_material(spec, "gate/" + IDLE, "#ff4d4d", emission=0.5)
+    _add_material(spec, "gate/" + ACTIVE, "#ffb02e", emission=0.7)
+    _add_material(spec, "gate/" + DONE, "#43d17c", emission=0.5)
+    _add_material(spec, "pad/" + IDLE, "#27b5e8", emission=0.25)
+    _add_material(spec, "pad/" + ACTIVE, "#aef6ff", emission=1.0)
+    _add_material(spec, "metal/", "#39424e", specular=0.6, shininess=0.6)
+    _add_material(spec, "ring/", "#bff0ff59", emission=0.8)
+    _add_material(spec, "collar/", "#e9eef3", specular=0.7, shininess=0.7)
+    _add_material(spec, "gold/", "#ffc928", emission=0.28, specular=0.9, shininess=0.6)
+    _add_material(spec, "trigger/", "#4aa3ff26", emission=0.4)
+    _add_material(spec, "beam/", "#7dffb0", emission=0.9)
+    _add_material(spec, "spark/", "#01ff64", emission=1.0)
+
+
+def _add_ground(spec: mujoco.MjSpec, level: Level) -> None:
+    """Draw one surface for all solids of a material, in place of the physics' boxes."""
+    for geom in spec.worldbody.geoms:
+        if geom.name.startswith("solid_"):
+            geom.group = _HIDDEN_GROUP
+    by_material: dict[str, list[Solid]] = defaultdict(list)
+    for solid in merge_solids(s for s in solids(level) if not _of_tube(s)):
+        by_material[solid.material].append(solid)
+    for name, pieces in by_material.items():
+        _add_ground_material(spec, level, name)
+        _add_surface(spec, part("ground") + name, [box_surface(piece) for piece in pieces], name)
+
+
+def _of_tube(solid: Solid) -> bool:
+    return solid.source.startswith("tubes[")
+
+
+def _add_ground_material(spec: mujoco.MjSpec, level: Level, name: str) -> None:
+    material = level.material(name)
+    rgb, alpha = textures.parse_colour(material.colour)
+    pixels = textures.floor_pixels(rgb, material.pattern)
+    textures.add_texture(spec, name, "2d", pixels)
+    see_through = f"#ffffff{round(alpha * 255):02x}"
+    _add_material(spec, name, see_through, texture=name, specular=0.15, shininess=0.4)
+
+
+def _add_surface(
+    spec: mujoco.MjSpec, name: str, surfaces: Sequence[Surface], material: str
+) -> None:
+    Surface.joined(surfaces).add_to(spec, name)
+    _add(
+        spec.worldbody,
+        name,
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=name,
+        material=material,
+    )
+
+
+def _paint_ball(spec: mujoco.MjSpec) -> None:
+    white, red, navy = ((0.96, 0.95, 0.92), (0.90, 0.20, 0.16), (0.13, 0.22, 0.42))
+    textures.add_texture(spec, "ball/", "cube", textures.ball_pixels((red, white, navy), 6))
+    _add_material(spec, "ball/", texture="ball/", specular=0.6, shininess=0.7, emission=0.1)
+    spec.geom(BALL).material = "ball/"
+
+
+def _add_tubes(spec: mujoco.MjSpec, level: Level) -> None:
+    panels: dict[str, list[Solid]] = defaultdict(list)
+    for solid in solids(level):
+        if _of_tube(solid):
+            panels[solid.source].append(solid)
+    for number, tube in enumerate(level.tubes):
+        walls = panels[f"tubes[{number}]"]
+        if not walls:
+            continue
+        if spec.material(tube.material) is None:
+            _add_ground_material(spec, level, tube.material)
+        _add_surface(spec, part("tube", number), [tube_surface(tube, walls)], tube.material)
+        if tube.opening is None:
+            _add_rings(spec, level, number)
+
+
+def _add_rings(spec: mujoco.MjSpec, level: Level, number: int) -> None:
+    """Add a closed tube's collars and the bands of light that run along it."""
+    tube = level.tubes[number]
+    outer = (tube.inner_radius + tube.thickness) / math.cos(math.pi / tube.sides)
+    band, collar, height = outer + quants(0.5), outer + quants(3.0), quants(6.0)
+    turn = full_turn(4 * tube.sides)
+    frame = tube_frame(tube)
+    frame[:, 1] = np.cross(frame[:, 2], frame[:, 0])
+    orientation = np.empty(4)
+    mujoco.mju_mat2Quat(orientation, frame.ravel())
+    middle = [(band, -height), (band, height)]
+    lathe(middle, turn).add_to(spec, part("ring", number))
+    ends = [(collar, -height), (collar, height), (tube.inner_radius, height)]
+    ends += [(tube.inner_radius, -height), (collar, -height)]
+    lathe(ends, turn).add_to(spec, part("collar", number))
+    for end, place in enumerate((tube.start, tube.end)):
+        _add(
+            spec.worldbody,
+            part("collar", number, end),
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=part("collar", number),
+            material="collar/",
+            pos=place,
+            quat=orientation,
+        )
+    for ring in range(int(math.dist(tube.start, tube.end) / RING_SPACING_M)):
+        _add(
+            spec.worldbody,
+            part("ring", number, ring),
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=part("ring", number),
+            material="ring/",
+            pos=tube.start,
+            quat=orientation,
+            castshadow=False,
+        )
+
+
+def _box(half: Sequence[float], **attributes: Any) -> dict[str, Any]:
+    return {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": half, **attributes}
+
+
+def _dress_plate(spec: mujoco.MjSpec, plate: Plate) -> None:
+    """Give the plate a dark edge and a cap whose colour tells its state."""
+    spec.geom(plate.name).material = "metal/"
+    x, y, z = (edge / 2 for edge in plate.size)
+    margin = min(quants(8.0), 0.2 * min(x, y))
+    cap = _box([x - margin, y - margin, quants(0.5)], pos=[0.0, 0.0, z], material="plate/" + IDLE)
+    _add(spec.body(plate.name), part("plate") + plate.name, **cap)
+
+
+def _dress_gate(spec: mujoco.MjSpec, gate: Gate) -> None:
+    """Give the gate's slab bars whose colour tells its state."""
+    spec.geom(gate.name).material = "metal/"
+    x, y, z = (edge / 2 for edge in gate.size)
+    proud = quants(1.0)
+    for bar in range(_GATE_BARS):
+        height = z * (1.0 - (2 * bar + 1) / (_GATE_BARS + 1))
+        half = [x + proud, y - proud, quants(3.0)] if x < y else [x - proud, y + proud, quants(3.0)]
+        box = _box(half, pos=[0.0, 0.0, height], material="gate/" + IDLE)
+        _add(spec.body(gate.name), part("gate", bar) + gate.name, **box)
+
+
+_GATE_BARS: Final = 7
+
+
+def _dress_pad(spec: mujoco.MjSpec, pad: LiftPad, number: int) -> None:
+    """Give the pad a disc that lights up, and a column of light to rise in."""
+    spec.geom(f"lift_pad_{number}").material = "metal/"
+    radius, top = 0.42 * min(pad.size[:2]), pad.at[2] + pad.size[2] / 2
+    _add(
+        spec.worldbody,
+        part("pad", number),
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[radius, quants(0.5), 0.0],
+        pos=[pad.at[0], pad.at[1], top],
+        material="pad/" + IDLE,
+    )
+    reach = quants(48.0)
+    _add(
+        spec.worldbody,
+        part("glow", number),
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[radius, reach, 0.0],
+        pos=[pad.at[0], pad.at[1], top + reach],
+        material="ring/",
+        castshadow=False,
+    )
+
+
+def _add_coins(spec: mujoco.MjSpec, level: Level) -> None:
+    positions, _ = coin_positions(level)
+    if len(positions) == 0:
+        return
+    segments = 24 if len(positions) <= _DETAILED_COINS else 8
+    _coin_surface(segments).add_to(spec, part("coin"))
+    for number, position in enumerate(positions):
+        _add(
+            spec.worldbody,
+            part("coin", number),
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=part("coin"),
+            material="gold/",
+            pos=position,
+        )
+
+
+def _coin_surface(segments: int) -> Surface:
+    """Return a coin with a raised rim, standing upright, its axis along x."""
+    radius, rim, face = _COIN_RADIUS_M, _COIN_HALF_THICKNESS_M, 0.5 * _COIN_HALF_THICKNESS_M
+    half = [(radius, 0.0), (radius, 0.7 * rim), (0.94 * radius, rim), (0.76 * radius, rim)]
+    half += [(0.70 * radius, face), (0.0, face)]
+    profile = [(r, -h) for r, h in reversed(half)] + half[1:]
+    upright = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    return lathe(profile, full_turn(segments)).moved(upright, np.zeros(3))
+
+
+def _add_triggers(spec: mujoco.MjSpec, level: Level) -> None:
+    """Show the one-time triggers as faint blue panes, as the original did; the others are unseen."""
+    for number, trigger in enumerate(level.camera_triggers):
+        if trigger.kind == "retreat" and trigger.size is not None:
+            half = [edge / 2 for edge in trigger.size]
+            pane = _box(half, pos=trigger.at, material="trigger/", castshadow=False)
+            _add(spec.worldbody, part("trigger", number), **pane)
+
+
+def _add_finish(spec: mujoco.MjSpec, level: Level) -> None:
+    """Add an arch over the finish's longer side, with a chequered beam and sparks."""
+    finish = level.finish
+    x, y, z = (edge / 2 for edge in finish.size)
+    post = quants(4.0)
+    textures.add_texture(spec, "chequers/", "2d", textures.chequered_pixels(2))
+    _add_material(spec, "chequers/", texture="chequers/", emission=0.3)
+    span = np.array([0.0, 1.0, 0.0]) if y >= x else np.array([1.0, 0.0, 0.0])
+    width = max(x, y)
+    base = np.array(finish.at) - [0.0, 0.0, z]
+    top = max(2.0 * z, quants(72.0))
+    for side, sign in enumerate((-1.0, 1.0)):
+        place = base + sign * width * span + [0.0, 0.0, top / 2]
+        pillar = _box([post, post, top / 2], pos=place, material="beam/")
+        _add(spec.worldbody, part("pillar", side), **pillar)
+    half = (width + 2 * post) * span + quants(5.0) * (1.0 - span)
+    half[2] = quants(10.0)
+    beam = Solid(
+        tuple(base + [0.0, 0.0, top]), tuple(half), _UPRIGHT, "chequers/", "finish"
+    )
+    _add_surface(spec, part("beam"), [box_surface(beam)], "chequers/")
+    for spark in range(SPARKS):
+        _add(
+            spec.worldbody,
+            part("spark", spark),
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[quants(1.0), 0.0, 0.0],
+            pos=finish.at,
+            material="spark/",
+            castshadow=False,
+        )
+
+
+_UPRIGHT: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -1,0 +1,156 @@
+"""Triangle surfaces for pictures: boxes with texture in world scale, and bodies of revolution.
+
+The physics makes do with MuJoCo's primitives. Pictures do not: a texture on a primitive starts
+anew on each one, so a floor of several boxes would show its seams.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.level.expand import Solid, tube_frame
+from roller_env.level.schema import Tube
+from roller_env.units import quants
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+
+TILE_M: Final = quants(64.0)
+"""Edge of the square of the world that one repetition of a texture covers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Triangles of n vertices; those that share a vertex are smooth there.
+
+    Attributes:
+        vertices: (n, 3) metres.
+        normals: (n, 3) unit vectors, out of the body.
+        texture: (n, 2) texture coordinates, in repetitions.
+        faces: (m, 3) indices of vertices, counterclockwise as seen from outside.
+    """
+
+    vertices: Float64
+    normals: Float64
+    texture: Float64
+    faces: Int64
+
+    @staticmethod
+    def joined(surfaces: Sequence[Surface]) -> Surface:
+        """Return all the surfaces as one."""
+        counts = [len(surface.vertices) for surface in surfaces]
+        offsets = np.cumsum([0, *counts[:-1]])
+        return Surface(
+            np.concatenate([surface.vertices for surface in surfaces]),
+            np.concatenate([surface.normals for surface in surfaces]),
+            np.concatenate([surface.texture for surface in surfaces]),
+            np.concatenate([s.faces + offset for s, offset in zip(surfaces, offsets, strict=True)]),
+        )
+
+    def moved(self, rotation: Float64, translation: Float64) -> Surface:
+        """Return the surface rotated by ``rotation``, (3, 3), and then moved."""
+        return Surface(
+            self.vertices @ rotation.T + translation,
+            self.normals @ rotation.T,
+            self.texture,
+            self.faces,
+        )
+
+    def add_to(self, spec: mujoco.MjSpec, name: str) -> None:
+        """Add the surface to ``spec`` as the mesh ``name``."""
+        spec.add_mesh(
+            name=name,
+            # Surfaces need not enclose anything, and nothing here has mass.
+            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+            uservert=self.vertices.ravel(),
+            usernormal=self.normals.ravel(),
+            usertexcoord=self.texture.ravel(),
+            userface=self.faces.ravel().astype(np.int32),
+        )
+
+
+def box_surface(solid: Solid) -> Surface:
+    """Return the six faces of a box; the textures of coplanar upright boxes go on unbroken."""
+    half, rotation = np.array(solid.half_size), np.array(solid.rotation)
+    # A tilted box has no better origin for its texture than its own middle.
+    origin = np.array(solid.centre) if solid.axis_aligned else np.zeros(3)
+    faces = []
+    for axis in range(3):
+        right, up = (1, 2) if axis == 0 else (0, 2) if axis == 1 else (0, 1)
+        for sign in (-1.0, 1.0):
+            corners = np.zeros((4, 3))
+            corners[:, axis] = sign
+            corners[:, right] = (-1.0, 1.0, 1.0, -1.0)
+            corners[:, up] = (-1.0, -1.0, 1.0, 1.0)
+            corners *= half
+            normal = np.zeros((4, 3))
+            normal[:, axis] = sign
+            texture = (corners + origin)[:, [right, up]] / TILE_M
+            # x cross y is z and y cross z is x, but x cross z is -y.
+            turned = (sign < 0.0) != (axis == 1)
+            order = np.array([[0, 2, 1], [0, 3, 2]] if turned else [[0, 1, 2], [0, 2, 3]])
+            faces.append(Surface(corners, normal, texture, order))
+    return Surface.joined(faces).moved(rotation, np.array(solid.centre))
+
+
+def lathe(profile: Sequence[tuple[float, float]], angles: Float64) -> Surface:
+    """Turn a profile about z.
+
+    Args:
+        profile: (radius, height) of its corners, metres; the body lies on the left of the way
+            from one to the next, so an outer side goes upwards.
+        angles: radians at which there are edges, rising.
+    """
+    ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    bands = []
+    length = 0.0
+    for (radius, height), (next_radius, next_height) in pairwise(profile):
+        along = math.hypot(next_radius - radius, next_height - height)
+        out, up = (next_height - height) / along, (radius - next_radius) / along
+        vertices = np.concatenate(
+            [
+                np.column_stack([ring * r, np.full(len(ring), h)])
+                for r, h in ((radius, height), (next_radius, next_height))
+            ]
+        )
+        normals = np.tile(np.column_stack([ring * out, np.full(len(ring), up)]), (2, 1))
+        around = angles * max(radius, next_radius)
+        texture = np.column_stack(
+            [np.tile(around, 2), np.repeat([length, length + along], len(ring))]
+        )
+        first = np.arange(len(ring) - 1)
+        above = first + len(ring)
+        lower = np.stack([first, first + 1, above + 1], axis=1)
+        upper = np.stack([first, above + 1, above], axis=1)
+        bands.append(Surface(vertices, normals, texture / TILE_M, np.concatenate([lower, upper])))
+        length += along
+    return Surface.joined(bands)
+
+
+def full_turn(segments: int) -> Float64:
+    """Return the angles of a closed ring, radians."""
+    return np.linspace(0.0, 2.0 * math.pi, segments + 1)
+
+
+def tube_surface(tube: Tube, panels: Iterable[Solid]) -> Surface:
+    """Return a tube's wall, rounded where the physics has the flat ``panels``."""
+    length, stretch = math.dist(tube.start, tube.end), 1.0 / math.cos(math.pi / tube.sides)
+    inner, outer = tube.inner_radius * stretch, (tube.inner_radius + tube.thickness) * stretch
+    profile = [(outer, 0.0), (outer, length), (inner, length), (inner, 0.0), (outer, 0.0)]
+    frame = tube_frame(tube)
+    frame[:, 1] = np.cross(frame[:, 2], frame[:, 0])
+    half_angle = math.pi / tube.sides
+    arcs = []
+    for panel in panels:
+        out = np.array(panel.rotation)[:, 0]
+        angle = math.atan2(out @ frame[:, 1], out @ frame[:, 0])
+        arcs.append(lathe(profile, np.array([angle - half_angle, angle + half_angle])))
+    return Surface.joined(arcs).moved(frame, np.array(tube.start))

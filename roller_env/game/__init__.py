@@ -1,0 +1,1 @@
+"""The rules of the game. Pure NumPy with a leading axis of environments."""

@@ -1,0 +1,74 @@
+"""Held keys -> the force on the ball.
+
+Each key pushes with the same force along a world axis; keys add, so two neighbouring keys push
+with 1.41 times the force along the diagonal, and opposite keys cancel.
+"""
+
+from __future__ import annotations
+
+from typing import Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.units import quants
+
+Float64 = npt.NDArray[np.float64]
+ActionMode = Literal["directions", "keys", "force"]
+
+KEY_FORCE_N: Final = quants(200.0)
+"""Force of one key on the ball of 1 kg: the original's 200 quant/s^2 of central force."""
+
+KEYS: Final = ("w", "a", "s", "d")
+
+KEY_AXES: Final = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+"""World x and y direction of each of `KEYS`: W forward +x, A left +y, S back, D right."""
+
+DIRECTIONS: Final = ("", "w", "wa", "a", "as", "s", "sd", "d", "wd")
+"""Keys held in each of the nine discrete actions: none, then round the compass from forward to
+the left."""
+
+_DIRECTION_KEYS: Final = np.array([[key in held for key in KEYS] for held in DIRECTIONS])
+
+
+def held_keys(held: str) -> npt.NDArray[np.int8]:
+    """Return which of `KEYS` the letters in ``held`` name, (4,) of 0 and 1."""
+    return np.array([key in held for key in KEYS], dtype=np.int8)
+
+
+def forces(mode: ActionMode, actions: npt.ArrayLike) -> Float64:
+    """Return the force that actions ask for.
+
+    Args:
+        mode: ``directions``: (N,) integers 0 to 8, indices of `DIRECTIONS`; ``keys``: (N, 4) of 0
+            and 1, one for each of `KEYS`; ``force``: (N, 2) from -1 to 1, in key forces along
+            world x and y. Numbers outside are clipped to that.
+        actions: actions of that mode.
+
+    Returns:
+        (N, 2) float64 newtons along world x and y.
+
+    Raises:
+        ValueError: the actions' shape, type or range is not that of the mode.
+    """
+    array = np.asarray(actions)
+    if mode == "directions":
+        if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
+            raise ValueError(
+                f"actions: found shape {array.shape} of {array.dtype}; 'directions' takes (N,) "
+                "integers"
+            )
+        if len(array) and not (array.min() >= 0 and array.max() < len(DIRECTIONS)):
+            raise ValueError(
+                f"actions: found {array.min()} to {array.max()}; 'directions' takes 0 to 8"
+            )
+        return KEY_FORCE_N * (_DIRECTION_KEYS[array] @ KEY_AXES)
+    if mode == "keys":
+        if array.ndim != 2 or array.shape[1] != len(KEYS):
+            raise ValueError(f"actions: found shape {array.shape}; 'keys' takes (N, 4)")
+        return KEY_FORCE_N * ((array != 0) @ KEY_AXES)
+    if array.ndim != 2 or array.shape[1] != 2:
+        raise ValueError(f"actions: found shape {array.shape}; 'force' takes (N, 2)")
+    if not np.isfinite(array).all():
+        raise ValueError("actions: found a number that is not finite; 'force' takes -1 to 1")
+    return KEY_FORCE_N * np.clip(array.astype(np.float64), -1.0, 1.0)

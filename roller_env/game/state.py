@@ -1,0 +1,121 @@
+"""GameState: all that the rules change, arrays with a leading axis of environments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.game.tables import Kind, LevelTable
+
+Float64 = npt.NDArray[np.float64]
+Bool = npt.NDArray[np.bool_]
+Int64 = npt.NDArray[np.int64]
+
+
+@dataclass(eq=False)
+class GameState:
+    """The game's own state of N environments; the ball and the slabs are MuJoCo's.
+
+    Attributes:
+        steps: (N,) control steps since the episode began.
+        control_delay_s: (N,) time until the keys work (the intro).
+        coin_taken: (N, K) which coins are collected.
+        touching: (N, M) which regions the ball was in at the end of the last step.
+        plate_struck: (N, P) which plates are sinking or down.
+        plate_down: (N, P) which plates have arrived.
+        gate_opening: (N, G) which gates are lowering or down.
+        thrust_s: (N, A) how much longer each lift pad pushes the ball up.
+        trigger_spent: (N, T) which one-time camera triggers are dead.
+        camera_mode: (N,) 0 to 5.
+        camera_delay_s: (N, T) time until each camera trigger sets mode 2; ``inf`` if it will not.
+        camera_x: (N,) world x of the camera while it retreats (mode 1), metres.
+        camera_heading: (N, 3) unit vector along which the ball last moved, for mode 4.
+        waypoint: (N,) index of the next waypoint of the route.
+        finished: (N,) the ball has reached the finish and is frozen.
+        fallen: (N,) the ball has fallen below the kill height.
+        diverged: (N,) the physics failed.
+        truncated: (N,) the time is up.
+    """
+
+    steps: Int64
+    control_delay_s: Float64
+    coin_taken: Bool
+    touching: Bool
+    plate_struck: Bool
+    plate_down: Bool
+    gate_opening: Bool
+    thrust_s: Float64
+    trigger_spent: Bool
+    camera_mode: Int64
+    camera_delay_s: Float64
+    camera_x: Float64
+    camera_heading: Float64
+    waypoint: Int64
+    finished: Bool
+    fallen: Bool
+    diverged: Bool
+    truncated: Bool
+
+    @staticmethod
+    def initial(table: LevelTable) -> GameState:
+        """Return the state of the table's rows at the start of an episode."""
+        n = len(table.start)
+
+        def flags(*shape: int) -> Bool:
+            return np.zeros((n, *shape), dtype=bool)
+
+        heading = np.zeros((n, 3))
+        heading[:, 0] = 1.0
+        return GameState(
+            steps=np.zeros(n, dtype=np.int64),
+            control_delay_s=np.zeros(n),
+            coin_taken=flags(table.width(Kind.COIN)),
+            touching=flags(table.region_radius.shape[1]),
+            plate_struck=flags(table.width(Kind.PLATE)),
+            plate_down=flags(table.width(Kind.PLATE)),
+            gate_opening=flags(table.gate_stop.shape[1]),
+            thrust_s=np.zeros((n, table.width(Kind.LIFT_PAD))),
+            trigger_spent=flags(table.width(Kind.TRIGGER)),
+            camera_mode=np.zeros(n, dtype=np.int64),
+            camera_delay_s=np.full((n, table.width(Kind.TRIGGER)), np.inf),
+            camera_x=np.zeros(n),
+            camera_heading=heading,
+            waypoint=np.zeros(n, dtype=np.int64),
+            finished=flags(),
+            fallen=flags(),
+            diverged=flags(),
+            truncated=flags(),
+        )
+
+    @property
+    def terminated(self) -> Bool:
+        """(N,) whether the game is over for good: finished, fallen or diverged."""
+        return self.finished | self.fallen | self.diverged
+
+    @property
+    def over(self) -> Bool:
+        """(N,) whether the episode has ended, also by time."""
+        return self.terminated | self.truncated
+
+    @property
+    def points(self) -> Int64:
+        """(N,) coins collected."""
+        points: Int64 = self.coin_taken.sum(axis=1)
+        return points
+
+    def copy_rows(self, rows: Int64 | slice = slice(None)) -> dict[str, npt.NDArray[Any]]:
+        """Return copies of the rows' arrays by name."""
+        return {f.name: np.array(getattr(self, f.name)[rows]) for f in fields(self)}
+
+    def set_rows(self, rows: Int64 | slice, values: dict[str, npt.NDArray[Any]]) -> None:
+        """Write what `copy_rows` returned back into ``rows``."""
+        for field in fields(self):
+            getattr(self, field.name)[rows] = values[field.name]
+
+
+def score_percent(points: Int64, coin_count: Int64) -> Float64:
+    """Return the percentage of the level's coins collected, (N,); 100 in a level without coins."""
+    return np.where(coin_count > 0, 100.0 * points / np.maximum(coin_count, 1), 100.0)

@@ -1,0 +1,26 @@
+"""What a level is: the models, the loader of level files and the checker. Pure data, no physics."""
+
+from __future__ import annotations
+
+from roller_env.level.check import check_level
+from roller_env.level.errors import LevelError, Problem
+from roller_env.level.load import (
+    level_json_schema,
+    levels_directory,
+    load_level,
+    parse_level,
+    shipped_levels,
+)
+from roller_env.level.schema import Level
+
+__all__ = [
+    "Level",
+    "LevelError",
+    "Problem",
+    "check_level",
+    "level_json_schema",
+    "levels_directory",
+    "load_level",
+    "parse_level",
+    "shipped_levels",
+]

@@ -1,0 +1,325 @@
+"""What a level must mean, once every field of it is well formed.
+
+Links lead somewhere, the ball starts in free space over the kill height, coins can be reached,
+plates can be struck, gates and pads do what they are for. Pure functions of the `Level`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.level.errors import FieldPath, Problem, listed, quoted
+from roller_env.level.expand import Float64, Solid, coin_positions, rotation_matrix, solids
+from roller_env.level.schema import (
+    BUILT_IN_MATERIALS,
+    MAX_COINS,
+    MAX_PIECES,
+    METRES_PER_UNIT,
+    PLATE_HIT_HEIGHT_M,
+    Coins,
+    Gate,
+    Level,
+    Plate,
+)
+
+Unit = Literal["metre", "quant"]
+
+CONTACT_TOLERANCE_M: Final = 0.001
+"""How deep one thing may reach into another and still count as touching it: covers rounded numbers
+in files and the depth to which a resting ball sinks into MuJoCo's soft contacts."""
+
+MAX_JITTER_SAMPLES: Final = 65
+"""Start positions tried along each axis of the jitter; corners and middle are always among them."""
+
+_PIECES_WITH_NAMES: Final = (
+    *("floors", "boxes", "ramps", "walls", "tubes"),
+    *("plates", "gates", "lift_pads"),
+)
+
+
+def check_level(level: Level, unit: Unit = "metre") -> list[Problem]:
+    """Return everything that is wrong with the meaning of a level.
+
+    Args:
+        level: the level.
+        unit: the unit in which messages give lengths: the one the designer wrote.
+
+    Returns:
+        The problems, without places in a file; empty for a level that can be played.
+    """
+    in_unit = _InUnit(unit)
+    too_many = list(_totals(level))
+    problems = [
+        *too_many,
+        *_materials(level),
+        *_names(level),
+        *_links(level),
+        *_heights(level, in_unit),
+        *_movers(level, in_unit),
+        *_lift_pads(level),
+    ]
+    if too_many:  # expanding them could take all memory
+        return problems
+    everything = _solid_at_the_start(level)
+    return [
+        *problems,
+        *_tubes(level, everything),
+        *_start(level, everything, in_unit),
+        *_coins(level, everything, in_unit),
+    ]
+
+
+class _InUnit:
+    """Writes lengths in the unit of the level's file."""
+
+    def __init__(self, unit: Unit) -> None:
+        self._unit, self._scale = unit, METRES_PER_UNIT[unit]
+
+    def length(self, metres: float) -> str:
+        value = f"{metres / self._scale:.6g}"
+        return f"{value} {self._unit}{'' if value == '1' else 's'}"
+
+    def rounded_up(self, metres: float) -> str:
+        return self.length(math.ceil(metres / self._scale * 100.0) / 100.0 * self._scale)
+
+    def point(self, point: Sequence[float]) -> str:
+        return f"[{', '.join(f'{value / self._scale:.6g}' for value in point)}]"
+
+
+def _totals(level: Level) -> Iterator[Problem]:
+    """Count without expanding."""
+    cells = [Counter("".join(plan.rows).replace(".", "")) for plan in level.floors]
+    coins, pieces = sum(map(_coin_count, level.coins)), 0
+    for plan, counts in zip(level.floors, cells, strict=True):
+        for character, number in counts.items():
+            cell = plan.cells[character]
+            coins += number * cell.coin
+            pieces += number * (2 if cell.wall > 0.0 else 1)
+    pieces += sum(tube.sides for tube in level.tubes)
+    for kind in ("boxes", "ramps", "walls", "plates", "gates", "lift_pads", "camera_triggers"):
+        pieces += len(getattr(level, kind))
+    if coins > MAX_COINS:
+        path = ("coins",) if level.coins else ("floors",)
+        yield Problem(path, f"found {coins} coins in all; allowed are at most {MAX_COINS}")
+    if pieces > MAX_PIECES:
+        found = f"found {pieces} pieces in all (cells of floors and panels of tubes included)"
+        yield Problem((), f"{found}; allowed are at most {MAX_PIECES}")
+
+
+def _coin_count(coins: Coins) -> int:
+    if coins.grid is not None:
+        return coins.grid.count[0] * coins.grid.count[1]
+    row = coins.line or coins.arc
+    return row.count if row is not None else 1
+
+
+def _materials(level: Level) -> Iterator[Problem]:
+    known = tuple(dict.fromkeys((*level.materials, *BUILT_IN_MATERIALS)))
+    for path, name in _materials_used(level):
+        if name not in known:
+            message = f"no material is called {quoted(name)}; there are {listed(known)}"
+            yield Problem((*path, "material"), message, written=name, known=known)
+
+
+def _materials_used(level: Level) -> Iterator[tuple[FieldPath, str]]:
+    for index, plan in enumerate(level.floors):
+        for character, cell in plan.legend.items():
+            yield ("floors", index, "legend", character), cell.material
+    for kind in ("boxes", "ramps", "walls", "tubes"):
+        for index, piece in enumerate(getattr(level, kind)):
+            yield (kind, index), piece.material
+
+
+def _names(level: Level) -> Iterator[Problem]:
+    taken: dict[str, str] = {}
+    for kind in _PIECES_WITH_NAMES:
+        for index, piece in enumerate(getattr(level, kind)):
+            if piece.name is None:
+                continue
+            if piece.name in taken:
+                message = f"{taken[piece.name]} already has this name; wanted one of its own"
+                yield Problem((kind, index, "name"), message)
+            taken.setdefault(piece.name, f"{kind}[{index}]")
+
+
+def _links(level: Level) -> Iterator[Problem]:
+    gates = tuple(gate.name for gate in level.gates)
+    for index, plate in enumerate(level.plates):
+        if not plate.opens:
+            message = f"the plate opens nothing; name at least one gate of {listed(gates)}"
+            yield Problem(("plates", index, "opens"), message if gates else _NO_GATES)
+        for number, name in enumerate(plate.opens):
+            if name not in gates:
+                message = f"no gate is called {quoted(name)}; there are {listed(gates)}"
+                message = message if gates else _NO_GATES
+                path = ("plates", index, "opens", number)
+                yield Problem(path, message, written=name, known=gates)
+    opened = {name for plate in level.plates for name in plate.opens}
+    for index, gate in enumerate(level.gates):
+        if gate.name not in opened:
+            message = f"no plate opens the gate {quoted(gate.name)}; name it in a plate's 'opens'"
+            yield Problem(("gates", index, "name"), message)
+
+
+_NO_GATES: Final = "the level has no gates that a plate could open"
+
+
+def _heights(level: Level, in_unit: _InUnit) -> Iterator[Problem]:
+    points: list[tuple[FieldPath, str, float]] = [
+        (("start", "at"), "the ball starts", level.start.at[2]),
+        (("finish", "at"), "the finish is", level.finish.at[2]),
+    ]
+    if level.route is not None:
+        for index, point in enumerate(level.route.points):
+            points.append((("route", "points", index), "the waypoint is", point[2]))
+    limit = in_unit.length(level.kill_height)
+    for path, subject, height in points:
+        if height <= level.kill_height:
+            found = f"{subject} at the height {in_unit.length(height)}"
+            yield Problem(path, f"{found}; wanted above the kill height, {limit}")
+
+
+def _movers(level: Level, in_unit: _InUnit) -> Iterator[Problem]:
+    for index, plate in enumerate(level.plates):
+        struck_at = level.ball.radius + plate.size[2] / 2
+        if struck_at < PLATE_HIT_HEIGHT_M + CONTACT_TOLERANCE_M:
+            least = 2 * (PLATE_HIT_HEIGHT_M + CONTACT_TOLERANCE_M - level.ball.radius)
+            yield Problem(
+                ("plates", index, "size", 2),
+                f"a ball on the plate is {in_unit.length(struck_at)} over its centre, and only "
+                f"hits from more than {in_unit.length(PLATE_HIT_HEIGHT_M)} count; "
+                f"wanted a plate at least {in_unit.rounded_up(least)} high",
+            )
+        if plate.sinks_to > plate.at[2]:
+            yield _rises(plate, ("plates", index, "sinks_to"), plate.sinks_to, in_unit)
+    for index, gate in enumerate(level.gates):
+        if gate.lowers_to > gate.at[2]:
+            yield _rises(gate, ("gates", index, "lowers_to"), gate.lowers_to, in_unit)
+
+
+def _rises(mover: Plate | Gate, path: FieldPath, target: float, in_unit: _InUnit) -> Problem:
+    found = "found" if path[-1] in mover.model_fields_set else "not given, so it is the original's"
+    allowed = f"wanted at most the height of 'at', {in_unit.length(mover.at[2])}"
+    return Problem(path, f"{found} {in_unit.length(target)}; {allowed}")
+
+
+def _lift_pads(level: Level) -> Iterator[Problem]:
+    weight = level.ball.mass_kg * level.gravity
+    for index, pad in enumerate(level.lift_pads):
+        if pad.force_n <= weight:
+            found = f"found {pad.force_n:.6g} N, which never lifts the ball"
+            path = ("lift_pads", index, "force_n")
+            yield Problem(path, f"{found}; wanted more than its weight, {weight:.6g} N")
+
+
+def _solid_at_the_start(level: Level) -> tuple[Solid, ...]:
+    """Return the static solids, and what moves where it stands at the start."""
+    blocks = list(solids(level))
+    for kind in ("plates", "gates", "lift_pads"):
+        for index, piece in enumerate(getattr(level, kind)):
+            length, width, height = piece.size
+            half = (length / 2, width / 2, height / 2)
+            rotation = rotation_matrix(getattr(piece, "yaw_deg", 0.0))
+            blocks.append(Solid(piece.at, half, rotation, "default", f"{kind}[{index}]"))
+    return tuple(blocks)
+
+
+def _tubes(level: Level, everything: Sequence[Solid]) -> Iterator[Problem]:
+    sources = {solid.source for solid in everything}
+    for index in range(len(level.tubes)):
+        if f"tubes[{index}]" not in sources:
+            message = "the opening leaves no panel of the tube; wanted a smaller one"
+            yield Problem(("tubes", index, "opening"), message)
+
+
+def _start(level: Level, everything: Sequence[Solid], in_unit: _InUnit) -> Iterator[Problem]:
+    radius, jitter = level.ball.radius, level.start.jitter
+    steps = [min(math.ceil(half / radius), MAX_JITTER_SAMPLES // 2) for half in jitter]
+    offsets = [
+        np.linspace(-half, half, 1 + 2 * n) if n else np.zeros(1)
+        for half, n in zip(jitter, steps, strict=True)
+    ]
+    xs, ys = np.meshgrid(*offsets, indexing="ij")
+    positions = np.array(level.start.at) + np.stack([xs, ys, 0.0 * xs], axis=-1).reshape(-1, 3)
+    margin = max(radius - CONTACT_TOLERANCE_M, 0.0)
+    hit = dict.fromkeys(solid.source for solid, _ in _inside(everything, positions, margin))
+    if hit:
+        where = " somewhere within its jitter" if any(jitter) else ""
+        yield Problem(
+            ("start", "at"),
+            f"the ball, of radius {in_unit.length(radius)}, would start inside {', '.join(hit)}"
+            f"{where}; wanted free space around it (on a floor: one radius over its upper face)",
+        )
+
+
+def _coins(level: Level, everything: Sequence[Solid], in_unit: _InUnit) -> Iterator[Problem]:
+    positions, sources = coin_positions(level)
+    low = np.flatnonzero(positions[:, 2] <= level.kill_height)
+    limit = in_unit.length(level.kill_height)
+    for path, text in _coin_groups(low, positions, sources, in_unit):
+        yield Problem(path, f"{text} not above the kill height, {limit}; move it up")
+    around: dict[int, str] = {}
+    shrunk = [replace(solid, half_size=_shrunk(solid.half_size)) for solid in everything]
+    for solid, indices in _inside(shrunk, positions, 0.0):
+        around.update(dict.fromkeys(indices.tolist(), solid.source))
+    buried = np.array(sorted(around), dtype=np.intp)
+    for path, text in _coin_groups(buried, positions, sources, in_unit):
+        first = next(index for index in buried if sources[index] == f"{path[0]}[{path[1]}]")
+        yield Problem(path, f"{text} inside {around[int(first)]}; move it into free space")
+
+
+def _coin_groups(
+    indices: npt.NDArray[np.intp], positions: Float64, sources: Sequence[str], in_unit: _InUnit
+) -> Iterator[tuple[FieldPath, str]]:
+    """Yield, for each piece that some of the coins come from, its path and the first of them."""
+    groups: dict[str, list[int]] = {}
+    for index in indices.tolist():
+        groups.setdefault(sources[index], []).append(index)
+    for source, members in groups.items():
+        kind, _, number = source.removesuffix("]").partition("[")
+        where = in_unit.point(positions[members[0]].tolist())
+        others = f" (the first of {len(members)})" if len(members) > 1 else ""
+        yield (kind, int(number)), f"the coin at {where}{others} is"
+
+
+def _shrunk(half_size: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = (max(half - CONTACT_TOLERANCE_M, 0.0) for half in half_size)
+    return x, y, z
+
+
+def _inside(
+    blocks: Sequence[Solid], points: Float64, margin: float
+) -> Iterator[tuple[Solid, npt.NDArray[np.intp]]]:
+    """Yield each solid that holds points, with their indices.
+
+    Of the three axes, each solid looks along the one on which fewest points fall into its extent:
+    a level's thousands of cells then meet only the few coins near them.
+    """
+    if not blocks or not len(points):
+        return
+    centres = np.array([solid.centre for solid in blocks])
+    rotations = np.array([solid.rotation for solid in blocks])
+    halves = np.array([solid.half_size for solid in blocks])
+    reach = np.einsum("nij,nj->ni", np.abs(rotations), halves) + margin + CONTACT_TOLERANCE_M
+    orders = [np.argsort(points[:, axis]) for axis in range(3)]
+    spans = np.empty((3, 2, len(blocks)), dtype=np.intp)
+    for axis, order in enumerate(orders):
+        along = points[order, axis]
+        spans[axis, 0] = np.searchsorted(along, centres[:, axis] - reach[:, axis], "left")
+        spans[axis, 1] = np.searchsorted(along, centres[:, axis] + reach[:, axis], "right")
+    counts = spans[:, 1] - spans[:, 0]
+    narrowest = counts.argmin(axis=0)
+    for number in np.flatnonzero(counts.min(axis=0) > 0).tolist():
+        axis = int(narrowest[number])
+        first, last = spans[axis, :, number]
+        near = orders[axis][first:last]
+        found = near[blocks[number].contains(points[near], margin)]
+        if len(found):
+            yield blocks[number], found

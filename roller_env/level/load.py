@@ -1,0 +1,189 @@
+"""YAML -> `Level`. A level that comes out of here is right in shape and in meaning.
+
+A file is judged in three stages: what YAML says (`yaml_tree`), whether every field is what its
+model allows (`schema`), what the level as a whole must mean (`check`). All problems of a stage are
+reported together; a later stage needs the earlier one to have found none, because a gate that could
+not be read would make every plate that names it look wrong.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from pydantic import ValidationError
+from pydantic.json_schema import GenerateJsonSchema
+from pydantic_core import CoreSchema
+
+from roller_env.level.check import Unit, check_level
+from roller_env.level.errors import LevelError, Problem, listed, quoted
+from roller_env.level.messages import explain
+from roller_env.level.schema import METRES_PER_UNIT, SCALE_KEY, Level
+from roller_env.level.yaml_tree import MAX_BYTES, Node, read_tree
+
+SUFFIXES: Final = (".yaml", ".yml")
+
+
+def load_level(source: str | os.PathLike[str] | Level) -> Level:
+    """Load and check a level.
+
+    Args:
+        source: the name of a shipped level ("classic"), the path of a .yaml file, or a `Level`,
+            which is checked and returned as it is. A string is a path if it ends in .yaml or .yml
+            or holds a directory separator.
+
+    Returns:
+        The level, lengths in metres.
+
+    Raises:
+        LevelError: there is no such level, or it has problems; all of them are in ``problems``.
+        TypeError: ``source`` is none of the three.
+    """
+    if isinstance(source, Level):
+        _refuse(check_level(source))
+        return source
+    is_name = isinstance(source, str) and _is_name(source)
+    path = _shipped_path(str(source)) if is_name else Path(source)
+    return _parse_bytes(_read(path), str(path))
+
+
+def parse_level(text: str, filename: str = "<text>") -> Level:
+    """Load and check a level from the text of a level file.
+
+    Args:
+        text: YAML; the format is described in docs/levels.md.
+        filename: what error messages call it.
+
+    Returns:
+        The level, lengths in metres.
+
+    Raises:
+        LevelError: the level has problems; all of them are in ``problems``.
+    """
+    root = read_tree(text, filename)
+    unit = _unit(root)
+    try:
+        level = Level.model_validate(root.plain(), context={SCALE_KEY: METRES_PER_UNIT[unit]})
+    except ValidationError as error:
+        raise LevelError(_in_file_order(explain(error, root, text, filename))) from None
+    _refuse(_placed(problem, root, filename) for problem in check_level(level, unit))
+    return level
+
+
+def shipped_levels() -> tuple[str, ...]:
+    """Return the names of the levels that come with the package, sorted."""
+    return tuple(sorted(path.stem for path in levels_directory().glob("*.yaml")))
+
+
+def levels_directory() -> Path:
+    """Return the directory of the shipped levels.
+
+    It is inside the package in an installed wheel, and beside the package in a checkout.
+
+    Raises:
+        FileNotFoundError: the installation has lost it.
+    """
+    package = Path(__file__).resolve().parents[1]
+    places = (package / "assets" / "levels", package.parent / "assets" / "levels")
+    for place in places:
+        if place.is_dir():
+            return place
+    raise FileNotFoundError(f"no directory of levels; looked for {listed([*map(str, places)])}")
+
+
+class _EditorSchema(GenerateJsonSchema):
+    """Pydantic's schema without the titles it makes of the field names, which say nothing."""
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
+
+    def generate(self, schema: CoreSchema, mode: Any = "validation") -> dict[str, Any]:
+        said: dict[str, Any] = _draft_07(super().generate(schema, mode))
+        return {"$schema": "http://json-schema.org/draft-07/schema#", **said}
+
+
+def level_json_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 7) of a level file, for editors to complete from."""
+    schema = Level.model_json_schema(schema_generator=_EditorSchema)
+    schema["title"] = "Roller level"
+    schema["description"] = "A level of Roller; see docs/levels.md."
+    return schema
+
+
+def _draft_07(schema: Any) -> Any:
+    """Say lists of fixed length in the words of draft 7, which every editor understands."""
+    if isinstance(schema, list):
+        return [_draft_07(item) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    said = {key: _draft_07(value) for key, value in schema.items()}
+    if "prefixItems" in said:
+        said["items"], *others = said.pop("prefixItems")
+        assert all(other == said["items"] for other in others), "a list of unlike items"
+    return said
+
+
+def _is_name(source: str) -> bool:
+    separators = [mark for mark in (os.sep, os.altsep) if mark]
+    return not source.endswith(SUFFIXES) and not any(mark in source for mark in separators)
+
+
+def _shipped_path(name: str) -> Path:
+    known = shipped_levels()
+    if name not in known:
+        shipped = listed(known) or "no levels"
+        message = f"no level is called {quoted(name)}; there are {shipped}, and paths end in .yaml"
+        raise LevelError([Problem((), message, written=name, known=known)])
+    return levels_directory() / f"{name}.yaml"
+
+
+def _read(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        levels = [other.name for suffix in SUFFIXES for other in path.parent.glob(f"*{suffix}")]
+        problem = Problem((), "there is no such file", written=path.name, known=tuple(levels))
+    except OSError as error:
+        problem = Problem((), f"the file cannot be read: {error.strerror}")
+    except ValueError as error:  # a NUL character in the path
+        problem = Problem((), f"the file cannot be read: {error}")
+    raise LevelError([replace(problem, filename=str(path))])
+
+
+def _parse_bytes(data: bytes, filename: str) -> Level:
+    if len(data) > MAX_BYTES:
+        message = f"the file is too large; allowed are at most {MAX_BYTES} bytes"
+        raise LevelError([Problem((), message, filename)])
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = data[: error.start]
+        line, column = before.count(b"\n") + 1, error.start - before.rfind(b"\n")
+        message = f"found the byte 0x{data[error.start]:02x}, which is not UTF-8; save it as UTF-8"
+        raise LevelError([Problem((), message, filename, line, column)]) from None
+    return parse_level(text, filename)
+
+
+def _unit(root: Node) -> Unit:
+    """Return the unit that the file names; metres if it names none, or none there is."""
+    node = root.find(("units",))
+    return "quant" if node is not None and node.value == "quant" else "metre"
+
+
+def _placed(problem: Problem, root: Node, filename: str) -> Problem:
+    line, column = root.position(problem.path)
+    return replace(problem, filename=filename, line=line, column=column)
+
+
+def _in_file_order(problems: Iterable[Problem]) -> list[Problem]:
+    return sorted(problems, key=lambda problem: (problem.line or 0, problem.column or 0))
+
+
+def _refuse(problems: Iterable[Problem]) -> None:
+    found = _in_file_order(problems)
+    if found:
+        raise LevelError(found)

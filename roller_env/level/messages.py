@@ -1,0 +1,192 @@
+"""pydantic's findings -> plain words: what was found in the file, and what is allowed there.
+
+What is allowed is read off the JSON Schema, so that an error and an editor's completion always
+agree with the models.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any, Final, get_args
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+from pydantic_core.core_schema import ErrorType
+
+from roller_env.level.errors import FieldPath, Problem, listed, quoted
+from roller_env.level.schema import COLOUR_PATTERN, NAME_PATTERN, Level
+from roller_env.level.yaml_tree import Node
+
+_PATTERNS: Final = {
+    NAME_PATTERN: "a letter, then letters, digits, '_' or '-', at most 64 in all",
+    COLOUR_PATTERN: "a colour '#rrggbb' or '#rrggbbaa' in quotes",
+}
+_PYDANTICS_OWN: Final = frozenset(get_args(ErrorType))
+_PLAN_ROW_ERRORS: Final = ("ragged_plan", "unknown_cell")
+_BOOLEAN_WORDS: Final = {"yes": "true", "on": "true", "no": "false", "off": "false"}
+_LONG_TEXT: Final = 64
+
+Schema = dict[str, Any]
+
+
+def explain(error: ValidationError, root: Node, text: str, filename: str) -> list[Problem]:
+    """Return the error's findings as problems of the file.
+
+    Args:
+        error: what pydantic says of the plain data of ``root``.
+        root: the file's tree.
+        text: the file's text.
+        filename: its name.
+    """
+    problems: dict[Problem, None] = {}
+    for details in error.errors(include_url=False):
+        problem = _in_words(details, root)
+        of_key = details["type"] == "extra_forbidden" or details["loc"][-1:] == ("[key]",)
+        line, column = root.position(problem.path, of_key=of_key)
+        if details["type"] in _PLAN_ROW_ERRORS:
+            line, column = _plan_place(root, problem.path, text, details["ctx"])
+        problems[replace(problem, filename=filename, line=line, column=column)] = None
+    return list(problems)
+
+
+def _in_words(details: ErrorDetails, root: Node) -> Problem:
+    """Return the problem without its place in the file."""
+    path, kind = details["loc"], details["type"]
+    if kind in _PLAN_ROW_ERRORS:
+        return Problem((*path, "plan"), details["msg"])
+    if kind not in _PYDANTICS_OWN:
+        return Problem(path, details["msg"])
+    if kind == "extra_forbidden":
+        known = tuple(_schema_at(path[:-1]).get("properties", {}))
+        message = f"unknown field {quoted(str(path[-1]))}; allowed: {', '.join(known)}"
+        return Problem(path, message, written=str(path[-1]), known=known)
+    if path and path[-1] == "[key]":
+        name, allowed = quoted(str(path[-2])), _PATTERNS[NAME_PATTERN]
+        return Problem(path[:-1], f"found the name {name}; allowed: {allowed}")
+    if kind == "missing" and isinstance(path[-1], str):
+        return Problem(path, f"missing; wanted {_describe(_schema_at(path))}")
+    if kind == "missing":  # an item of a list of fixed length
+        path = path[:-1]
+    node, schema = root.find(path), _schema_at(path)
+    assert node is not None, "pydantic complains of a value, so the file has one"
+    allowed = "a finite number" if kind == "finite_number" else _describe(schema)
+    message = f"found {_found(node)}; allowed: {allowed}{_advice(node, schema)}"
+    written = node.value if isinstance(node.value, str) else ""
+    return Problem(path, message, written=written, known=tuple(schema.get("enum", ())))
+
+
+def _found(node: Node) -> str:
+    value = node.value
+    if isinstance(value, dict):
+        return f"a mapping with the fields {', '.join(map(quoted, list(value)[:5]))}"
+    if isinstance(value, list):
+        return f"a list of {len(value)}" if value else "an empty list"
+    if isinstance(value, str):
+        long = len(value) > _LONG_TEXT
+        return f"a text of {len(value)} characters" if long else f"the text {quoted(value)}"
+    return "nothing" if value is None else str(node.text)
+
+
+def _advice(node: Node, schema: Schema) -> str:
+    if schema.get("type") == "string" and isinstance(node.value, bool | int | float):
+        return " (put it in quotes)" if "enum" not in schema else ""
+    if schema.get("type") == "boolean" and isinstance(node.value, str):
+        meant = _BOOLEAN_WORDS.get(node.value.lower())
+        return f" (did you mean {meant}?)" if meant else ""
+    return ""
+
+
+def _plan_place(root: Node, path: FieldPath, text: str, found: dict[str, Any]) -> tuple[int, int]:
+    """Return the position of a row, and of a strange character in it, of a plan drawn as a block.
+
+    Args:
+        root: the file's tree.
+        path: the plan.
+        text: the file's text.
+        found: ``number``, the row from 1, and perhaps ``character``, in quotes.
+    """
+    line, column = root.position(path)
+    plan = root.find(path)
+    if plan is None or not plan.is_block:
+        return line, column
+    lines = text.splitlines()
+    rows = [index for index in range(line, len(lines)) if lines[index].strip()]
+    row = rows[found["number"] - 1]
+    indent = len(lines[row]) - len(lines[row].lstrip())
+    strange = lines[row].find(found.get("character", "''")[1:-1], indent)
+    return row + 1, max(strange, indent) + 1
+
+
+@cache
+def _level_schema() -> Schema:
+    return Level.model_json_schema()
+
+
+def _resolved(schema: Schema) -> Schema:
+    """Follow references, and of "something or null" take the something."""
+    while "$ref" in schema or "anyOf" in schema:
+        if "$ref" in schema:
+            name = schema["$ref"].removeprefix("#/$defs/")
+            schema = _level_schema()["$defs"][name]
+        else:
+            schema = next(choice for choice in schema["anyOf"] if choice.get("type") != "null")
+    return schema
+
+
+def _schema_at(path: FieldPath) -> Schema:
+    """Return the schema of the field at ``path``."""
+    schema = _resolved(_level_schema())
+    for part in path:
+        if isinstance(part, int):
+            fixed = schema.get("prefixItems")
+            inner = fixed[part] if fixed else schema["items"]
+        elif part in schema.get("properties", {}):
+            inner = schema["properties"][part]
+        elif "patternProperties" in schema:
+            (inner,) = schema["patternProperties"].values()
+        else:
+            inner = schema["additionalProperties"]
+        schema = _resolved(inner)
+    return schema
+
+
+def _describe(schema: Schema) -> str:
+    if "enum" in schema:
+        return listed(schema["enum"])
+    kind = schema["type"]
+    if kind == "object" and "properties" in schema:
+        return f"a mapping with the fields {', '.join(schema['properties'])}"
+    if kind == "object":
+        return "a mapping from names to what they stand for"
+    if kind == "array":
+        return _describe_list(schema)
+    if kind == "string":
+        longest = schema.get("maxLength")
+        text = f"text of at most {longest} characters" if longest else "text"
+        return _PATTERNS.get(schema.get("pattern", ""), text)
+    if kind == "boolean":
+        return "true or false"
+    return f"a {'whole ' if kind == 'integer' else ''}number{_bounds(schema)}"
+
+
+def _describe_list(schema: Schema) -> str:
+    if "prefixItems" in schema:
+        first, count = schema["prefixItems"][0], len(schema["prefixItems"])
+        whole = "whole " if first["type"] == "integer" else ""
+        return f"a list of {count} {whole}numbers{_bounds(first)}"
+    if "maxItems" in schema:
+        return f"a list of {schema['minItems']} to {schema['maxItems']} items"
+    return "a list, each item after a '- '"
+
+
+def _bounds(schema: Schema) -> str:
+    if "minimum" in schema and "maximum" in schema:
+        return f" from {schema['minimum']:g} to {schema['maximum']:g}"
+    words = {
+        "exclusiveMinimum": "greater than",
+        "minimum": "of at least",
+        "exclusiveMaximum": "less than",
+        "maximum": "at most",
+    }
+    return " and".join(f" {word} {schema[key]:g}" for key, word in words.items() if key in schema)

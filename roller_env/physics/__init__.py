@@ -1,0 +1,1 @@
+"""How the world moves: contact parameters, named physics settings, the batch stepper."""

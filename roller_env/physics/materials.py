@@ -1,0 +1,107 @@
+"""Friction and elasticity -> MuJoCo's contact parameters.
+
+MuJoCo has no coefficient of restitution. A contact is a spring and a damper of the *acceleration*,
+``x'' = -K x - B x'`` (K in 1/s^2, B in 1/s, whatever the mass), that pushes and never pulls. Such
+a contact has a restitution that follows from the damping ratio ``zeta = B / (2 sqrt(K))`` alone
+(Schwager & Poeschel 2007, "Coefficient of restitution and linear-dashpot model revisited"):
+
+    zeta = sin(a) < 1:   e = exp(-(pi - 2 a) tan(a))
+    zeta = cosh(b) > 1:  e = exp(-2 b coth(b))
+
+so a wanted restitution is met by inverting it. The direct form ``solref = (-K, -B)`` is used since
+in the (time constant, ratio) form the stiffness grows as 1/ratio^2 and bouncy balls gain energy.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+PLASTIC_RESTITUTION = 0.015
+"""What an elasticity of 0 is given. A linear contact cannot have exactly 0: the overdamped spring
+that would need pushes the ball out of the ground ever more slowly (rate e * B)."""
+
+IMPEDANCE = 0.99
+"""Constant constraint impedance d. The ball rests (1 - d) g / K deep, and friction slips (1 - d)."""
+
+DAMPING_STEPS = 0.9
+"""B h, the share of the approach speed that one step of the plastic contact removes; explicit
+integration of the damper needs it below 1."""
+
+BOUNCE_STEPS = 24.0
+"""Steps that an elastic contact lasts. The restitution varies by about 0.5 / BOUNCE_STEPS with the
+moment within a step at which the ball arrives; softer contacts than this would look like rubber."""
+
+
+@dataclass(frozen=True, slots=True)
+class ContactParameters:
+    """What a MuJoCo geom of higher priority than the ball is given.
+
+    Attributes:
+        friction: Coulomb coefficient of the pair.
+        solref: direct form, (-K, -B): minus stiffness in 1/s^2, minus damping in 1/s.
+        solimp: constraint impedance (dmin, dmax, width, midpoint, power).
+    """
+
+    friction: float
+    solref: tuple[float, float]
+    solimp: tuple[float, float, float, float, float]
+
+
+def restitution(zeta: float) -> float:
+    """Return the coefficient of restitution of a linear contact of damping ratio ``zeta`` >= 0."""
+    if zeta < 1.0:
+        angle = math.asin(zeta)
+        return math.exp(-(math.pi - 2.0 * angle) * math.tan(angle))
+    if zeta == 1.0:
+        return math.exp(-2.0)
+    beta = math.acosh(zeta)
+    return math.exp(-2.0 * beta / math.tanh(beta))
+
+
+def damping_ratio(elasticity: float) -> float:
+    """Return the damping ratio whose restitution is ``elasticity``; in (0, 1].
+
+    Raises:
+        ValueError: the elasticity is not in (0, 1].
+    """
+    if not 0.0 < elasticity <= 1.0:
+        raise ValueError(f"elasticity must be in (0, 1], found {elasticity}")
+    low, high = 0.0, 1.0
+    while restitution(high) > elasticity:
+        high *= 2.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if restitution(middle) > elasticity else (low, middle)
+    return (low + high) / 2
+
+
+def contact_parameters(friction: float, elasticity: float, dt_s: float) -> ContactParameters:
+    """Return contact parameters with the pair's measured friction and restitution.
+
+    Args:
+        friction: Coulomb coefficient of the pair, >= 0.
+        elasticity: coefficient of restitution of the pair, 0 to 1.
+        dt_s: the physics time step, which bounds how stiff a contact may be.
+    """
+    zeta = damping_ratio(max(elasticity, PLASTIC_RESTITUTION))
+    if elasticity <= PLASTIC_RESTITUTION:
+        omega = DAMPING_STEPS / dt_s / (2.0 * zeta)
+    else:
+        omega = _phase_at_release(zeta) / (BOUNCE_STEPS * dt_s)
+    return ContactParameters(
+        friction,
+        (-(omega**2), -2.0 * zeta * omega),
+        (IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0),
+    )
+
+
+def _phase_at_release(zeta: float) -> float:
+    """Return omega times the duration of the contact, from touching to letting go."""
+    if zeta < 1.0:
+        angle = math.asin(zeta)
+        return (math.pi - 2.0 * angle) / math.cos(angle)
+    if zeta == 1.0:
+        return 2.0
+    beta = math.acosh(zeta)
+    return 2.0 * beta / math.sinh(beta)

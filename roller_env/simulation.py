@@ -1,0 +1,390 @@
+"""Simulation: N games at once. The one place where physics and rules meet."""
+
+from __future__ import annotations
+
+import tempfile
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.compile.compiled import CompiledLevel, compile_level
+from roller_env.config import EnvConfig
+from roller_env.game import observations, rewards, rules
+from roller_env.game.state import GameState, score_percent
+from roller_env.game.tables import LevelTable
+from roller_env.level import Level, load_level
+from roller_env.physics.stepper import Stepper
+
+Float32 = npt.NDArray[np.float32]
+Float64 = npt.NDArray[np.float64]
+Bool = npt.NDArray[np.bool_]
+Int64 = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """Everything that a row's future depends on, for n rows.
+
+    Attributes:
+        level: what is played; another level's simulation refuses the snapshot.
+        physics: (n, nstate) float64, MuJoCo's integration state.
+        game: the arrays of `GameState`.
+        level_of_row: (n,) which level each row plays.
+        generators: the random generators' states.
+    """
+
+    level: Level
+    physics: Float64
+    game: dict[str, npt.NDArray[Any]]
+    level_of_row: Int64
+    generators: tuple[dict[str, Any], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Transition:
+    """The result of one control step, arrays of (N,).
+
+    Rows that were not stepped, because their game is over or they were held, have reward 0.
+
+    Attributes:
+        reward: float64.
+        terminated: finished, fallen or diverged, now or before.
+        truncated: the time is up, and not terminated.
+        stepped: which rows were stepped.
+    """
+
+    reward: Float64
+    terminated: Bool
+    truncated: Bool
+    stepped: Bool
+
+
+class Simulation:
+    """N independent games of one level, stepped together.
+
+    A step, in the order that the README calls the transition contract: physics; events along the
+    path; reward and termination for the task as it was when the step began; consequences.
+    `observe` then shows the new state.
+
+    Attributes:
+        config: the options.
+        compiled: the level and its model.
+        state: the game's state; read it, and change it only through `restore`.
+        table: the level data of every row.
+        num_envs: N.
+        divergences: how many games the physics has ended so far.
+    """
+
+    def __init__(self, config: EnvConfig, num_envs: int = 1):
+        """Compile the level and make ``num_envs`` games of it; call `reset` before `step`.
+
+        Raises:
+            LevelError: the level is not valid.
+            ValueError: ``num_envs`` is less than 1.
+        """
+        if num_envs < 1:
+            raise ValueError(f"num_envs: found {num_envs}; must be at least 1")
+        self.config = config
+        self.num_envs = num_envs
+        self.compiled: CompiledLevel = compile_level(load_level(config.level), config.physics)
+        self.divergences = 0
+        self._levels = LevelTable.of([self.compiled.level])
+        self._level_of_row = np.zeros(num_envs, dtype=np.int64)
+        self.table = self._levels.for_rows(self._level_of_row)
+        self.state = GameState.initial(self.table)
+        self._stepper = Stepper(
+            self.compiled.model, num_envs, config.substeps, config.num_threads
+        )
+        self._generators = [np.random.default_rng() for _ in range(num_envs)]
+        self._potential = np.zeros(num_envs)
+        self._ray_directions = observations.ray_directions()
+        self._scan_offsets = observations.scan_offsets()
+        ball, velocity = self.compiled.ball_qpos, self.compiled.ball_qvel
+        self._position = self._stepper.qpos[:, ball : ball + 3]
+        self._orientation = self._stepper.qpos[:, ball + 3 : ball + 7]
+        self._velocity = self._stepper.qvel[:, velocity : velocity + 3]
+        self._spin = self._stepper.qvel[:, velocity + 3 : velocity + 6]
+
+    # What can be read ------------------------------------------------------------------------
+
+    @property
+    def duration_s(self) -> float:
+        """Length of a control step."""
+        return self.config.substeps * self.compiled.preset.dt_s
+
+    @property
+    def ball_position(self) -> Float64:
+        """(N, 3) copy of the ball centres, metres, world frame."""
+        return self._position.copy()
+
+    @property
+    def qpos(self) -> Float64:
+        """(N, nq) copy of MuJoCo's positions, for drawing."""
+        return self._stepper.qpos.copy()
+
+    @property
+    def max_steps(self) -> Int64:
+        """(N,) control steps after which an episode is truncated."""
+        steps = np.ceil(self.table.time_limit_s / self.duration_s - 1e-9).astype(np.int64)
+        limit = self.config.max_episode_steps
+        return steps if limit is None else np.minimum(steps, limit)
+
+    @property
+    def time_s(self) -> Float64:
+        """(N,) time since each episode began."""
+        return self.state.steps * self.duration_s
+
+    def results(self, rows: Int64) -> dict[str, npt.NDArray[Any]]:
+        """Return how the games in ``rows`` stand, arrays of (n,) by name.
+
+        ``success`` (the finish was reached), ``score_percent`` (coins of the level's, 0 to 100),
+        ``coins`` (collected), ``time_s``, ``fall`` and ``diverged``.
+        """
+        coins = self.state.points[rows]
+        return {
+            "success": self.state.finished[rows],
+            "score_percent": score_percent(coins, self.table.coin_count[rows]),
+            "coins": coins,
+            "time_s": self.time_s[rows],
+            "fall": self.state.fallen[rows],
+            "diverged": self.state.diverged[rows],
+        }
+
+    # What changes it -------------------------------------------------------------------------
+
+    def seed(self, generators: list[np.random.Generator]) -> None:
+        """Give every row its random generator; the caller may keep using them."""
+        if len(generators) != self.num_envs:
+            raise ValueError(
+                f"generators: found {len(generators)}; needed is one a row, {self.num_envs}"
+            )
+        self._generators = generators
+
+    def reset(self, rows: Int64 | None = None, intro: bool = False) -> None:
+        """Load the level anew in ``rows`` (all, if None).
+
+        Args:
+            rows: (n,) row indices.
+            intro: whether the keys work only after the intro's `rules.INTRO_S`, as when the game
+                is started; after a fall it goes on at once.
+        """
+        rows = np.arange(self.num_envs) if rows is None else np.asarray(rows, dtype=np.int64)
+        if len(rows) == 0:
+            return
+        table = self._levels.for_rows(self._level_of_row[rows])
+        self._stepper.reset(rows)
+        jitter = np.array([self._generators[row].uniform(-1.0, 1.0, 2) for row in rows])
+        start = table.start.copy()
+        start[:, :2] += jitter * table.jitter
+        self._position[rows] = start
+        fresh = GameState.initial(table)
+        if intro:
+            fresh.control_delay_s[:] = rules.INTRO_S
+        self.state.set_rows(rows, fresh.copy_rows())
+        self._measure_potential(rows)
+
+    def step(self, force_n: Float64, hold: Bool | None = None) -> Transition:
+        """Advance every game that is not over by one control step.
+
+        Args:
+            force_n: (N, 2) newtons of the keys on each ball, world x and y.
+            hold: (N,) rows to leave alone.
+        """
+        idle = self.state.over if hold is None else self.state.over | hold
+        if not idle.any():
+            reward = self._step_rows(None, self.state, self.table, force_n)
+        else:
+            reward = np.zeros(self.num_envs)
+            rows = np.flatnonzero(~idle)
+            if len(rows):
+                part = GameState(**self.state.copy_rows(rows))
+                table = self._levels.for_rows(self._level_of_row[rows])
+                reward[rows] = self._step_rows(rows, part, table, force_n[rows])
+                self.state.set_rows(rows, part.copy_rows())
+        return Transition(
+            reward, self.state.terminated, self.state.truncated.copy(), np.logical_not(idle)
+        )
+
+    def _step_rows(
+        self, rows: Int64 | None, state: GameState, table: LevelTable, force_n: Float64
+    ) -> Float64:
+        """Step ``rows`` (None: all), whose state and level data are given; return the rewards."""
+        every: Int64 | slice = slice(None) if rows is None else rows
+        before = self._stepper.state[every].copy()
+        self._set_controls(every, rules.controls(state, table, force_n, self.duration_s))
+        path = self._stepper.advance(rows)
+        diverged = self._stepper.diverged()[every] | ~np.isfinite(path[:, -1]).all(axis=1)
+        if diverged.any():
+            self._end_diverged(every, diverged, path, before, table)
+            state.diverged |= diverged
+            # Put back at the start, the ball must not collect what lies there.
+            state.touching[diverged] = True
+        ball = self.compiled.ball_qpos
+        motion = rules.Motion(
+            ball=path[:, :, ball : ball + 3],
+            plate=path[:, -1, self.compiled.plate_qpos],
+            velocity=self._velocity[every],
+            duration_s=self.duration_s,
+        )
+        events = rules.find_events(state, table, motion)
+        reward = rewards.points_reward(events, self.config.reward_weights)
+        rules.apply(state, table, motion, events)
+        state.truncated = ~state.terminated & (state.steps >= self.max_steps[every])
+        if self.config.reward == "shaped":
+            reward += self._shaping(every, state, table, motion.ball[:, -1])
+        return reward
+
+    def _set_controls(self, rows: Int64 | slice, controls: rules.Controls) -> None:
+        ctrl = np.empty((len(controls.force_n), self._stepper.ctrl.shape[1]))
+        ctrl[:, self.compiled.force_ctrl] = controls.force_n
+        ctrl[:, self.compiled.plate_ctrl] = controls.plate_velocity
+        ctrl[:, self.compiled.gate_ctrl] = controls.gate_velocity
+        self._stepper.ctrl[rows] = ctrl
+
+    def _shaping(
+        self, rows: Int64 | slice, state: GameState, table: LevelTable, ball: Float64
+    ) -> Float64:
+        """Return the shaping reward of the rows' step, and remember the new potential."""
+        rewards.follow_route(state, table, ball)
+        weight = self.config.reward_weights.progress
+        potential = weight * rewards.route_progress(state, table, ball)
+        shaping = rewards.shaping(
+            self._potential[rows], potential, state.terminated, self.config.discount
+        )
+        self._potential[rows] = potential
+        return shaping
+
+    def _measure_potential(self, rows: Int64) -> None:
+        """Set the potential of rows whose state was replaced."""
+        if self.config.reward != "shaped":
+            return
+        part = GameState(**self.state.copy_rows(rows))
+        table = self._levels.for_rows(self._level_of_row[rows])
+        progress = rewards.route_progress(part, table, self._position[rows])
+        self._potential[rows] = self.config.reward_weights.progress * progress
+
+    def _end_diverged(
+        self,
+        every: Int64 | slice,
+        diverged: Bool,
+        path: Float64,
+        before: Float64,
+        table: LevelTable,
+    ) -> None:
+        """Save what diverged, and put those rows' physics back to the start, where it is finite.
+
+        Their games are over, so nothing reads the physics but the last observation.
+        """
+        rows = np.arange(self.num_envs)[every][diverged]
+        self.divergences += len(rows)
+        report = _report_divergence(self.compiled, before[diverged], self._stepper.ctrl[rows])
+        warnings.warn(
+            f"{len(rows)} game(s) of level {self.compiled.level.name!r} diverged and were ended; "
+            f"the state before is in {report}",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+        self._stepper.reset(rows)
+        self._position[rows] = table.start[diverged]
+        path[diverged] = self._stepper.qpos[rows][:, None, :]
+
+    # What is seen ----------------------------------------------------------------------------
+
+    def observe(self, rows: Int64 | None = None) -> Float32:
+        """Return the observation vectors of ``rows`` (all, if None), (n, size) float32.
+
+        They are laid out as `roller_env.game.observations.entries` of the configured mode says.
+        """
+        every: Int64 | slice = slice(None) if rows is None else rows
+        if rows is None:
+            state, table = self.state, self.table
+        else:
+            state = GameState(**self.state.copy_rows(rows))
+            table = self._levels.for_rows(self._level_of_row[rows])
+        ball = observations.BallState(
+            position=self._position[every],
+            velocity=self._velocity[every],
+            orientation=self._orientation[every],
+            spin=self._spin[every],
+            gate=self._stepper.qpos[every][:, self.compiled.gate_qpos],
+        )
+        vector = observations.state_observation(
+            ball, state, table, self.max_steps[every].astype(np.float64)
+        )
+        if self.config.observation != "rays":
+            return vector
+        return np.concatenate([vector, self._cast_rays(rows, ball.position, table)], axis=1)
+
+    def _cast_rays(self, rows: Int64 | None, ball: Float64, table: LevelTable) -> Float32:
+        body = self.compiled.ball_body
+        level_origins = np.broadcast_to(
+            ball[:, None, :], (len(ball), len(self._ray_directions), 3)
+        )
+        level_rays = self._stepper.rays(level_origins, self._ray_directions, body, rows)
+        down = np.broadcast_to([0.0, 0.0, -1.0], self._scan_offsets.shape)
+        scan = self._stepper.rays(ball[:, None, :] + self._scan_offsets, down, body, rows)
+        return observations.ray_observation(level_rays, scan, table.ball_radius)
+
+    # What is kept ----------------------------------------------------------------------------
+
+    def snapshot(self, rows: Int64 | None = None) -> Snapshot:
+        """Return all that the future of ``rows`` (all, if None) depends on, as copies."""
+        rows = np.arange(self.num_envs) if rows is None else np.asarray(rows, dtype=np.int64)
+        return Snapshot(
+            level=self.compiled.level,
+            physics=self._stepper.state[rows].copy(),
+            game=self.state.copy_rows(rows),
+            level_of_row=self._level_of_row[rows].copy(),
+            generators=tuple(self._generators[row].bit_generator.state for row in rows),
+        )
+
+    def restore(self, snapshot: Snapshot, rows: Int64 | None = None) -> None:
+        """Put a snapshot of n rows into ``rows`` (the first n, if None), of this or another size.
+
+        The same actions then give the same bits as they did after the snapshot.
+
+        Raises:
+            ValueError: the snapshot is of another level, or does not fit the rows.
+        """
+        count = len(snapshot.physics)
+        rows = np.arange(count) if rows is None else np.asarray(rows, dtype=np.int64)
+        places = np.unique(rows)
+        if len(rows) != count or len(places) != count or not (
+            0 <= places.min(initial=0) and places.max(initial=0) < self.num_envs
+        ):
+            raise ValueError(
+                f"rows: found {rows.tolist()}; needed are {count} different ones from 0 to "
+                f"{self.num_envs - 1}"
+            )
+        if snapshot.level != self.compiled.level:
+            raise ValueError(
+                f"snapshot: found one of level {snapshot.level.name!r}; this simulation plays "
+                f"{self.compiled.level.name!r}"
+            )
+        self._stepper.reset(rows)
+        self._stepper.state[rows] = snapshot.physics
+        self.state.set_rows(rows, snapshot.game)
+        self._level_of_row[rows] = snapshot.level_of_row
+        for row, generator in zip(rows, snapshot.generators, strict=True):
+            self._generators[row].bit_generator.state = generator
+        self._measure_potential(rows)
+
+
+def _report_divergence(compiled: CompiledLevel, state: Float64, ctrl: Float64) -> Path:
+    """Write states before a step that failed, with all that is needed to repeat it."""
+    handle = tempfile.NamedTemporaryFile(  # noqa: SIM115 - the file is to outlive this function
+        prefix=f"roller-diverged-{compiled.level.name}-", suffix=".npz", delete=False
+    )
+    with handle:
+        np.savez_compressed(
+            handle,
+            state=state,
+            ctrl=ctrl,
+            level=np.array(compiled.level.model_dump_json()),
+            preset=np.array(repr(compiled.preset)),
+        )
+    return Path(handle.name)

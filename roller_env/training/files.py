@@ -1,0 +1,130 @@
+"""Where a run keeps what, and how a file is written so that no reader ever meets half of it."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+
+class RunError(RuntimeError):
+    """A run directory that cannot be used as asked; the message says what would be right."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunFiles:
+    """The files of one run, ``runs/<name>/``.
+
+    Attributes:
+        directory: of the run.
+    """
+
+    directory: Path
+
+    @property
+    def config(self) -> Path:
+        """The configuration the run was started with."""
+        return self.directory / "config.yaml"
+
+    @property
+    def checkpoint(self) -> Path:
+        """All that is needed to go on; see `roller_env.training.checkpoint`."""
+        return self.directory / "checkpoint.zip"
+
+    @property
+    def policy(self) -> Path:
+        """The trained agent, as Stable-Baselines3 saves it."""
+        return self.directory / "policy.zip"
+
+    @property
+    def normaliser(self) -> Path:
+        """Statistics of the observations, as Stable-Baselines3's VecNormalize saves them."""
+        return self.directory / "vecnormalize.pkl"
+
+    @property
+    def progress(self) -> Path:
+        """One row an update."""
+        return self.directory / "progress.csv"
+
+    @property
+    def tensorboard(self) -> Path:
+        """Event files: ``tensorboard --logdir runs``."""
+        return self.directory / "tb"
+
+    @property
+    def learning_curve(self) -> Path:
+        """Picture of `progress`."""
+        return self.directory / "learning_curve.png"
+
+    @property
+    def evaluation(self) -> Path:
+        """The evaluation table, for machines."""
+        return self.directory / "evaluation.json"
+
+    @property
+    def evaluation_table(self) -> Path:
+        """The evaluation table, for people."""
+        return self.directory / "evaluation.md"
+
+    @property
+    def episodes(self) -> Path:
+        """The evaluation's episodes, one row each."""
+        return self.directory / "evaluation.csv"
+
+    @property
+    def paths(self) -> Path:
+        """The level from above with the evaluation's paths."""
+        return self.directory / "paths.png"
+
+    @property
+    def video(self) -> Path:
+        """One episode."""
+        return self.directory / "episode.mp4"
+
+    @property
+    def summary(self) -> Path:
+        """What ran, on what, for how long; written last: a run that has it is finished."""
+        return self.directory / "run.json"
+
+
+def write_atomically(file: Path, content: bytes | str) -> None:
+    """Write a file so that, whenever the process dies, it holds the old content or the new.
+
+    The half-written copy of a process that died is overwritten by the next call.
+
+    Raises:
+        OSError: the disk is full or not writable; the old content is still there.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    temporary = file.with_name(file.name + ".tmp")
+    with temporary.open("wb") as stream:
+        stream.write(data)
+        stream.flush()
+        os.fsync(stream.fileno())
+    temporary.replace(file)
+    # The new name is in the directory, which reaches the disk in its own time unless told.
+    descriptor = os.open(file.parent, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def only_one_process(directory: Path) -> Iterator[None]:
+    """Hold a run for this process; the operating system lets go of it however the process ends.
+
+    Raises:
+        RunError: another process is training this run.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    with (directory / ".lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            message = f"{directory} is being trained by another process; choose another --name"
+            raise RunError(message) from error
+        yield

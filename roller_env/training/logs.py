@@ -1,0 +1,106 @@
+"""Training logs that go on where they were, in CSV and for TensorBoard.
+
+Stable-Baselines3's CSV writer empties the file it opens, and TensorBoard would show what a killed
+run logged after its last checkpoint twice.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from pathlib import Path
+from typing import Any, Final
+
+from stable_baselines3.common.logger import KVWriter, TensorBoardOutputFormat
+from torch.utils.tensorboard.writer import SummaryWriter
+
+from roller_env.training.files import write_atomically
+
+STEPS: Final = "time/total_timesteps"
+"""The column by which rows are ordered; Stable-Baselines3's name for it."""
+
+
+class ContinuingCSV(KVWriter):
+    """A CSV file with one header and one row an update, whatever happened in between.
+
+    Columns are those of the first row, so every row must bring the same ones.
+    """
+
+    def __init__(self, file: Path, steps: int) -> None:
+        """Open the file, and forget the rows that the training is about to repeat.
+
+        Args:
+            file: made if it does not exist.
+            steps: the training's step count now.
+        """
+        kept = [row for row in read_progress(file) if int(row[STEPS]) <= steps]
+        self._columns = list(kept[0]) if kept else []
+        text = io.StringIO()
+        if kept:
+            writer = csv.DictWriter(text, self._columns, lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(kept)
+        write_atomically(file, text.getvalue())
+        self._stream = file.open("a", encoding="utf-8", newline="")
+
+    def write(
+        self,
+        key_values: dict[str, Any],
+        key_excluded: dict[str, tuple[str, ...]],
+        step: int = 0,
+    ) -> None:
+        """Append one row; flushed, so that it survives the process."""
+        del key_excluded, step
+        if not self._columns:
+            self._columns = sorted(key_values)
+            self._writer().writeheader()
+        self._writer().writerow(key_values)
+        self._stream.flush()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._stream.close()
+
+    def _writer(self) -> csv.DictWriter[str]:
+        return csv.DictWriter(self._stream, self._columns, lineterminator="\n")
+
+
+class ContinuingTensorBoard(TensorBoardOutputFormat):
+    """Event files in one directory, which TensorBoard shows as one curve without repeats."""
+
+    def __init__(self, directory: Path, steps: int) -> None:
+        """Start an event file.
+
+        Args:
+            directory: made if it does not exist.
+            steps: the training's step count now; TensorBoard drops what older files say of
+                later steps.
+        """
+        self.writer = SummaryWriter(log_dir=str(directory), purge_step=steps + 1)
+        self._is_closed = False
+
+    def write(
+        self,
+        key_values: dict[str, Any],
+        key_excluded: dict[str, tuple[str, ...]],
+        step: int = 0,
+    ) -> None:
+        """Append one point a curve; none where there was nothing to measure (NaN)."""
+        known = {key: value for key, value in key_values.items() if not _is_nan(value)}
+        super().write(known, {key: key_excluded[key] for key in known}, step)
+
+
+def read_progress(file: Path) -> list[dict[str, str]]:
+    """Return the complete rows of a progress file, none if there is no file.
+
+    A last row that a dying process did not finish is left out.
+    """
+    if not file.exists():
+        return []
+    text = file.read_text(encoding="utf-8")
+    return list(csv.DictReader(io.StringIO(text[: text.rfind("\n") + 1])))
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and math.isnan(value)

@@ -1,0 +1,207 @@
+"""The learning itself: Stable-Baselines3's PPO, kept on record and able to go on after a kill."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.utils import LinearSchedule
+from stable_baselines3.common.vec_env import VecNormalize
+
+from roller_env.envs.sb3 import RollerVecEnv
+from roller_env.training.checkpoint import Progress, load_checkpoint, save_checkpoint
+from roller_env.training.config import TrainingConfig
+from roller_env.training.display import ProgressDisplay
+from roller_env.training.files import RunFiles
+from roller_env.training.logs import STEPS, ContinuingCSV, ContinuingTensorBoard
+
+_ACTIVATIONS: Final[dict[str, type[torch.nn.Module]]] = {
+    "tanh": torch.nn.Tanh,
+    "relu": torch.nn.ReLU,
+    "elu": torch.nn.ELU,
+}
+
+
+def learn(config: TrainingConfig, files: RunFiles) -> tuple[PPO, Progress]:
+    """Train to the end of the configuration, from the checkpoint if there is one.
+
+    Args:
+        config: of the training.
+        files: where checkpoint and logs are.
+
+    Returns:
+        The learner, its environments inside, and how far it came.
+    """
+    torch.set_num_threads(config.torch_threads)
+    environments = make_environments(config, config.num_envs, config.seed)
+    if files.checkpoint.exists():
+        checkpoint = load_checkpoint(files.checkpoint)
+        model, progress = checkpoint.restore(environments), checkpoint.progress
+    else:
+        model, progress = new_model(config, environments), Progress()
+    if is_complete(config, progress):
+        return model, progress
+    outputs = [
+        ContinuingCSV(files.progress, progress.steps),
+        ContinuingTensorBoard(files.tensorboard, progress.steps),
+    ]
+    model.set_logger(Logger(str(files.directory), outputs))
+    recorder = _Recorder(config, files, progress)
+    try:
+        model.learn(
+            total_timesteps=config.total_steps - progress.steps,
+            callback=recorder,
+            reset_num_timesteps=False,
+            # The recorder writes a row when its update is done, not before as SB3 would.
+            log_interval=sys.maxsize,
+        )
+    except _BudgetSpent:
+        pass
+    finally:
+        recorder.display.close()
+        model.logger.close()
+    return model, recorder.progress
+
+
+def is_complete(config: TrainingConfig, progress: Progress) -> bool:
+    """Return whether a training wants no more steps."""
+    budget_s = config.wall_clock_budget_s
+    out_of_time = budget_s is not None and progress.wall_s >= budget_s
+    return progress.steps >= config.total_steps or out_of_time
+
+
+def make_environments(config: TrainingConfig, num_envs: int, seed: int) -> RollerVecEnv:
+    """Return environments as a configuration wants them."""
+    return RollerVecEnv(config.level, num_envs, seed=seed, **config.environment_options)
+
+
+def new_model(config: TrainingConfig, environments: RollerVecEnv) -> PPO:
+    """Return a learner that knows nothing yet."""
+    normaliser = VecNormalize(
+        environments,
+        norm_obs=config.normalise_observations,
+        norm_reward=config.normalise_rewards,
+        gamma=config.ppo.gamma,
+    )
+    ppo = config.ppo
+    end = 0.0 if ppo.learning_rate_decay == "linear" else ppo.learning_rate
+    policy = "MultiInputPolicy" if config.environment.get("observation") == "dict" else "MlpPolicy"
+    return PPO(
+        policy,
+        normaliser,
+        learning_rate=LinearSchedule(ppo.learning_rate, end, end_fraction=1.0),
+        n_steps=ppo.rollout_steps,
+        batch_size=ppo.batch_size,
+        n_epochs=ppo.epochs,
+        gamma=ppo.gamma,
+        gae_lambda=ppo.gae_lambda,
+        clip_range=ppo.clip_range,
+        ent_coef=ppo.entropy_coefficient,
+        vf_coef=ppo.value_coefficient,
+        max_grad_norm=ppo.max_grad_norm,
+        target_kl=ppo.target_kl,
+        policy_kwargs={
+            "net_arch": list(ppo.hidden_sizes),
+            "activation_fn": _ACTIVATIONS[ppo.activation],
+        },
+        seed=config.seed,
+        device="cpu",
+    )
+
+
+class _BudgetSpent(Exception):  # noqa: N818  not an error
+    """Leaves SB3's loop between two updates, which a callback's False cannot."""
+
+
+@dataclass(slots=True)
+class _Episodes:
+    """The episodes that ended during one rollout."""
+
+    infos: list[dict[str, Any]] = field(default_factory=list)
+
+    def statistics(self) -> dict[str, float]:
+        """Return means; NaN where no episode ended."""
+        return {
+            "rollout/episodes": len(self.infos),
+            "rollout/ep_rew_mean": self._mean([info["episode"]["r"] for info in self.infos]),
+            "rollout/ep_len_mean": self._mean([info["episode"]["l"] for info in self.infos]),
+            "rollout/success_rate": self._mean([info["success"] for info in self.infos]),
+            "rollout/score_percent": self._mean([info["score_percent"] for info in self.infos]),
+            "rollout/coins": self._mean([info["coins"] for info in self.infos]),
+            "rollout/fall_rate": self._mean([info["fall"] for info in self.infos]),
+            "rollout/diverged": sum(info["diverged"] for info in self.infos),
+        }
+
+    @staticmethod
+    def _mean(values: list[float]) -> float:
+        return float(np.mean(values)) if values else float("nan")
+
+
+class _Recorder(BaseCallback):
+    """Between two updates: a row in the logs, the display, and a checkpoint when one is due."""
+
+    def __init__(self, config: TrainingConfig, files: RunFiles, progress: Progress) -> None:
+        super().__init__()
+        self.progress = progress
+        self.display = ProgressDisplay(config.total_steps, progress.steps)
+        self._config = config
+        self._files = files
+        self._wall_s_before = progress.wall_s
+        self._start_s = self._checkpoint_s = time.monotonic()
+        self._episodes = _Episodes()
+
+    def _on_step(self) -> bool:
+        infos = self.locals["infos"]
+        self._episodes.infos += [infos[row] for row in np.flatnonzero(self.locals["dones"])]
+        return True
+
+    def _on_rollout_start(self) -> None:
+        # SB3 has no event for the end of an update; the next rollout's start is the same moment.
+        self._between_updates()
+        if is_complete(self._config, self.progress):
+            raise _BudgetSpent
+
+    def _on_training_end(self) -> None:
+        self._between_updates()
+
+    def _between_updates(self) -> None:
+        steps = self.model.num_timesteps
+        if steps == self.progress.steps:
+            return
+        before = self.progress
+        wall_s = self._wall_s_before + time.monotonic() - self._start_s
+        self.progress = replace(before, steps=steps, wall_s=wall_s)
+        speed = (steps - before.steps) / max(wall_s - before.wall_s, 1e-9)
+        statistics = self._episodes.statistics()
+        self._episodes = _Episodes()
+        for key, value in statistics.items():
+            self.logger.record(key, value)
+        self.logger.record(STEPS, steps, exclude="tensorboard")
+        self.logger.record("time/fps", round(speed))
+        self.logger.record("time/wall_s", round(wall_s, 3), exclude="tensorboard")
+        self.logger.dump(steps)
+        self.display.update(steps, _achieved(statistics))
+        self._checkpoint_if_due()
+
+    def _checkpoint_if_due(self) -> None:
+        age_s = time.monotonic() - self._checkpoint_s
+        if age_s >= self._config.checkpoint_interval_s or is_complete(self._config, self.progress):
+            assert isinstance(self.model, PPO)
+            save_checkpoint(self._files.checkpoint, self.model, self._config, self.progress)
+            self._checkpoint_s = time.monotonic()
+
+
+def _achieved(statistics: dict[str, float]) -> str:
+    if not statistics["rollout/episodes"]:
+        return "no episode ended yet"
+    return (
+        f"finish {statistics['rollout/success_rate']:.0%}, "
+        f"coins {statistics['rollout/coins']:.1f}, falls {statistics['rollout/fall_rate']:.0%}"
+    )

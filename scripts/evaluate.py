@@ -1,0 +1,68 @@
+"""Play a trained agent and say how good it is.
+
+Examples::
+
+    python scripts/evaluate.py runs/ppo_classic-seed0
+    python scripts/evaluate.py runs/ppo_classic-seed0 --episodes 1000 --seed 7 --output evaluations/
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from roller_env.level.errors import LevelError
+from roller_env.training import load_policy
+from roller_env.training.files import RunError, RunFiles
+from roller_env.training.pictures import draw_paths, record_video
+from roller_env.training.report import markdown_table, write_evaluation
+from roller_env.training.run import evaluate_policy
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """Play a trained agent and print its evaluation table."""
+
+    run: Annotated[Path, tyro.conf.Positional]
+    """Directory of the run."""
+
+    level: str | None = None
+    """Name or path of another level than the one trained on."""
+
+    episodes: int = 100
+    """How many to play."""
+
+    seed: int | None = None
+    """Of the environments; by default one that training never used."""
+
+    output: Path | None = None
+    """Directory for the table, the episodes, the paths from above and a video."""
+
+
+def main(arguments: Arguments) -> None:
+    """Do what the command line says."""
+    policy = load_policy(arguments.run)
+    config = policy.config
+    if arguments.level is not None:
+        config = config.model_copy(update={"level": arguments.level})
+    evaluation = evaluate_policy(policy, config, arguments.episodes, arguments.seed)
+    print(markdown_table(evaluation, config))
+    if arguments.output is None:
+        return
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    files = RunFiles(arguments.output)
+    write_evaluation(evaluation, config, files)
+    draw_paths(evaluation, files.paths)
+    record_video(policy, config, files.video)
+    print(f"written to {arguments.output}")
+
+
+if __name__ == "__main__":
+    try:
+        main(tyro.cli(Arguments, description=__doc__))
+    except (RunError, LevelError) as error:
+        sys.exit(f"error: {error}")

@@ -1,0 +1,86 @@
+"""Train an agent, evaluate it and draw what it does.
+
+Examples::
+
+    python scripts/train.py --config configs/ppo_classic.yaml --seed 1
+    python scripts/train.py --config configs/ppo_classic.yaml --seed 1 --resume
+    python scripts/train.py --config configs/ppo_gate.yaml --set ppo.gamma=0.995 --name far-sighted
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from roller_env.level.errors import LevelError
+from roller_env.training import ConfigError, TrainingRun, load_config, train
+from roller_env.training.checkpoint import CheckpointError
+from roller_env.training.files import RunError
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """Train an agent, evaluate it and draw what it does; all of it goes into runs/<name>/."""
+
+    config: Path = Path("configs/ppo_classic.yaml")
+    """What to train, and how."""
+
+    name: str | None = None
+    """The run's; by default the configuration's file name and the seed."""
+
+    seed: int | None = None
+    """Instead of the configuration's."""
+
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FIELD=VALUE")] = ()
+    """Other values than the configuration's, such as num_envs=64 ppo.gamma=0.995."""
+
+    resume: bool = False
+    """Go on with a run that was stopped, even by a kill; says where the results are if none was."""
+
+    runs: Path = Path("runs")
+    """Directory of all runs."""
+
+
+def main(arguments: Arguments) -> None:
+    """Do what the command line says."""
+    seed = () if arguments.seed is None else (f"seed={arguments.seed}",)
+    config = load_config(arguments.config, (*arguments.set, *seed))
+    name = arguments.name or f"{arguments.config.stem}-seed{config.seed}"
+    directory = arguments.runs / name
+    print(f"Training {config.algorithm.upper()} on {config.level}, seed {config.seed}: {directory}")
+    print_results(train(config, directory, resume=arguments.resume))
+
+
+def print_results(run: TrainingRun) -> None:
+    """Say where everything is."""
+    if run.was_finished:
+        print(f"{run.files.directory} is finished already; remove it to train it anew.")
+        print(run.files.evaluation_table.read_text())
+    files = run.files
+    results = {
+        "policy": files.policy,
+        "normalisation": files.normaliser,
+        "training log": files.progress,
+        "TensorBoard": files.tensorboard,
+        "learning curve": files.learning_curve,
+        "evaluation": files.evaluation_table,
+        "episodes": files.episodes,
+        "paths from above": files.paths,
+        "video": files.video,
+        "all about the run": files.summary,
+    }
+    for title, path in results.items():
+        print(f"  {title:<18} {path}" if path.exists() else f"  {title:<18} (not drawn)")
+
+
+if __name__ == "__main__":
+    try:
+        main(tyro.cli(Arguments, description=__doc__))
+    except (ConfigError, RunError, CheckpointError, LevelError) as error:
+        sys.exit(f"error: {error}")
+    except KeyboardInterrupt:
+        sys.exit("\nstopped; --resume goes on from the last checkpoint")

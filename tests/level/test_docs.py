@@ -1,0 +1,75 @@
+"""docs/levels.md: every example in it works as it says, and it leaves no field out."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from roller_env.level import LevelError, level_json_schema, parse_level
+
+DOCS = Path(__file__).parents[2] / "docs" / "levels.md"
+TEXT = DOCS.read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```([a-z ]+)\n(.*?)^```$", TEXT, re.MULTILINE | re.DOTALL)
+EXAMPLES = [body for kind, body in BLOCKS if kind == "yaml"]
+BROKEN = [
+    (body, BLOCKS[index + 1][1]) for index, (kind, body) in enumerate(BLOCKS) if "broken" in kind
+]
+LEFT_OUT = {
+    "name": "name: example",
+    "units": "units: quant",
+    "start": "start: {at: [0, 0, 5000]}",
+    "finish": "finish: {at: [0, 0, 5000], size: [1, 1, 1]}",
+}
+
+
+def completed(example: str) -> str:
+    """Return the example with what the page says the examples leave out."""
+    written = re.findall(r"^([a-z_]+):", example, re.MULTILINE)
+    return "\n".join([*(line for key, line in LEFT_OUT.items() if key not in written), example])
+
+
+def test_the_page_has_the_examples_that_the_tests_below_are_about() -> None:
+    assert len(EXAMPLES) >= 10
+    assert len(BROKEN) == 2
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_every_example_loads(example: str) -> None:
+    assert parse_level(completed(example)).name in ("example", "hello")
+
+
+def test_the_first_example_is_a_whole_level() -> None:
+    assert parse_level(EXAMPLES[0]).name == "hello"
+
+
+@pytest.mark.parametrize(("example", "printed"), BROKEN)
+def test_every_broken_example_says_what_the_page_prints(example: str, printed: str) -> None:
+    with pytest.raises(LevelError) as caught:
+        parse_level(example, "oops.yaml")
+    assert str(caught.value) + "\n" == printed
+
+
+def test_the_python_examples_run(tmp_path: Path) -> None:
+    (tmp_path / "hello.yaml").write_text(EXAMPLES[0], encoding="utf-8")
+    programs = [body + "print(level.name)\n" for kind, body in BLOCKS if kind == "python"]
+    run = subprocess.run(
+        [sys.executable, "-c", "".join(programs)],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(DOCS.parents[1])},
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    assert run.stdout.split() == ["hello", "plank"]
+
+
+def test_every_field_of_every_piece_is_on_the_page() -> None:
+    schema = level_json_schema()
+    pieces = {"Level": schema, **schema["$defs"]}
+    fields = {field for piece in pieces.values() for field in piece["properties"]}
+    assert {field for field in fields if f"`{field}`" not in TEXT} == set()

@@ -1,0 +1,141 @@
+from __future__ import annotations
+
+import re
+import tempfile
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from roller_env.compile.compiled import compile_level
+from roller_env.config import EnvConfig
+from roller_env.level import Level
+from roller_env.simulation import Simulation, Transition
+from tests.builders import coin, make_level, resting
+from tests.simulation.driving import bits, simulation_of, wandering
+
+POISONS = {
+    "nan_velocity": (True, np.nan),
+    "infinite_velocity": (True, np.inf),
+    "huge_velocity": (True, 1e300),
+    "nan_position": (False, np.nan),
+    "huge_position": (False, -1e300),
+}
+
+
+@pytest.fixture(autouse=True)
+def reports(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The directory that reports of divergence are written to."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log where it runs
+    return tmp_path
+
+
+def poison(simulation: Simulation, row: int, kind: str = "nan_velocity") -> None:
+    """Write a number that physics cannot go on from into one row."""
+    is_velocity, value = POISONS[kind]
+    snapshot = simulation.snapshot()
+    compiled = simulation.compiled
+    # MuJoCo's integration state begins with time, qpos and qvel.
+    at = 1 + (compiled.model.nq + compiled.ball_qvel if is_velocity else compiled.ball_qpos)
+    snapshot.physics[row, at] = value
+    simulation.restore(snapshot)
+
+
+def diverge(simulation: Simulation) -> Transition:
+    with pytest.warns(RuntimeWarning, match="diverged"):
+        return simulation.step(np.zeros((simulation.num_envs, 2)))
+
+
+@pytest.mark.parametrize("observation", ["state", "rays"])
+@pytest.mark.parametrize("kind", POISONS)
+def test_a_diverging_game_ends_alone(kind: str, observation: str) -> None:
+    options = {"reward": "shaped", "observation": observation, "num_threads": 2}
+    poisoned = simulation_of("gate", num_envs=4, **options)
+    healthy = simulation_of("gate", num_envs=4, **options)
+    for force, _ in zip(wandering(4), range(10), strict=False):
+        poisoned.step(force)
+        healthy.step(force)
+    poison(poisoned, row=1, kind=kind)
+    transition = diverge(poisoned)
+    healthy.step(np.zeros((4, 2)))
+
+    assert transition.terminated.tolist() == [False, True, False, False]
+    assert not transition.truncated.any()
+    assert poisoned.results(np.arange(4))["diverged"].tolist() == [False, True, False, False]
+    assert poisoned.divergences == 1
+    assert np.isfinite(transition.reward).all()
+    assert np.isfinite(poisoned.observe()).all()
+    neighbours = [0, 2, 3]
+    for force, _ in zip(wandering(4, seed=50), range(30), strict=False):
+        expected, found = bits(healthy), bits(poisoned)
+        assert [found[row] for row in neighbours] == [expected[row] for row in neighbours]
+        assert healthy.observe()[neighbours].tobytes() == poisoned.observe()[neighbours].tobytes()
+        healthy.step(force)
+        poisoned.step(force)
+
+
+def test_a_game_that_diverged_stays_over_and_a_reset_begins_it_as_if_it_were_new() -> None:
+    simulation, fresh = simulation_of("bridge"), simulation_of("bridge")
+    poison(simulation, row=0)
+    diverge(simulation)
+    assert not simulation.step(np.zeros((1, 2))).stepped.any()
+    simulation.reset()
+    fresh.reset()
+    for force, _ in zip(wandering(1), range(60), strict=False):
+        assert bits(simulation) == bits(fresh)
+        simulation.step(force)
+        fresh.step(force)
+    assert simulation.divergences == 1
+
+
+def test_a_game_diverges_in_a_part_of_the_rows_as_it_does_among_all() -> None:
+    simulation = simulation_of("bridge", num_envs=3)
+    poison(simulation, row=2)
+    with pytest.warns(RuntimeWarning, match="1 game"):
+        transition = simulation.step(np.zeros((3, 2)), hold=np.array([True, False, False]))
+    assert transition.terminated.tolist() == [False, False, True]
+    assert transition.stepped.tolist() == [False, True, True]
+
+
+def test_divergence_is_neither_a_fall_nor_a_success_and_earns_nothing() -> None:
+    simulation = simulation_of(make_level(coins=[coin(*resting())]))
+    poison(simulation, row=0)
+    transition = diverge(simulation)
+    results = {name: values[0] for name, values in simulation.results(np.array([0])).items()}
+    assert transition.reward.tolist() == [0.0]
+    assert (results["coins"], results["fall"], results["success"]) == (0, False, False)
+
+
+def test_the_report_repeats_the_divergence(reports: Path) -> None:
+    simulation = simulation_of("classic", num_envs=3, physics="fast")
+    poison(simulation, row=0, kind="huge_velocity")
+    poison(simulation, row=2, kind="nan_position")
+    with pytest.warns(RuntimeWarning) as caught:
+        simulation.step(np.ones((3, 2)))
+    (path,) = reports.glob("*.npz")
+    assert re.search(re.escape(str(path)), str(caught[0].message))
+    with np.load(path, allow_pickle=False) as report:
+        state, ctrl = report["state"], report["ctrl"]
+        level = Level.model_validate_json(str(report["level"]))
+        preset = str(report["preset"])
+    assert level == simulation.compiled.level
+    assert preset == repr(simulation.compiled.preset)
+    assert len(state) == len(ctrl) == 2
+    model = compile_level(level, "fast").model
+    for row in range(2):
+        data = mujoco.MjData(model)
+        mujoco.mj_setState(model, data, state[row], mujoco.mjtState.mjSTATE_INTEGRATION)
+        data.ctrl[:] = ctrl[row]
+        assert data.ctrl[simulation.compiled.force_ctrl].tolist() == [1.0, 1.0, 0.0]
+        mujoco.mj_step(model, data)
+        assert sum(warning.number for warning in data.warning) > 0
+
+
+def test_a_simulation_that_never_diverged_writes_nothing(reports: Path) -> None:
+    simulation = Simulation(EnvConfig(level="bridge"), 2)
+    simulation.reset()
+    for force, _ in zip(wandering(2), range(20), strict=False):
+        simulation.step(force)
+    assert (simulation.divergences, list(reports.iterdir())) == (0, [])

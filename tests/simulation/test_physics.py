@@ -1,0 +1,55 @@
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from roller_env.level import shipped_levels
+from tests.simulation.driving import along_the_route, simulation_of, wandering
+
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+
+
+def plain_copies(model: mujoco.MjModel, states: np.ndarray) -> list[mujoco.MjData]:
+    """Return one MjData for each row of integration states."""
+    copies = [mujoco.MjData(model) for _ in states]
+    for data, state in zip(copies, states, strict=True):
+        mujoco.mj_setState(model, data, state, STATE)
+    return copies
+
+
+@pytest.mark.parametrize("physics", ["fast", "default", "accurate"])
+@pytest.mark.parametrize("level", shipped_levels())
+def test_a_step_is_a_loop_of_mj_step_bit_for_bit(level: str, physics: str) -> None:
+    simulation = simulation_of(
+        level, num_envs=3, physics=physics, reward="shaped", control_dt_s=1 / 20, num_threads=2
+    )
+    model, substeps = simulation.compiled.model, simulation.config.substeps
+    copies = plain_copies(model, simulation.snapshot().physics)
+    wander = wandering(num_envs=3)
+    state = np.empty(mujoco.mj_stateSize(model, STATE))
+    for _ in range(40 if physics == "accurate" else 150):
+        # Two rows of three go along the route, to the plates and pads.
+        force = along_the_route(simulation)
+        force[2] = next(wander)[2]
+        stepped = simulation.step(force).stepped
+        after = simulation.snapshot().physics
+        for row in np.flatnonzero(stepped):
+            # The controls that a step set are part of the state that it left.
+            mujoco.mj_setState(model, expected := mujoco.MjData(model), after[row], STATE)
+            copies[row].ctrl[:] = expected.ctrl
+            for _ in range(substeps):
+                mujoco.mj_step(model, copies[row])
+            mujoco.mj_getState(model, copies[row], state, STATE)
+            assert state.tobytes() == after[row].tobytes()
+
+
+def test_the_keys_and_the_lift_are_newtons_on_the_ball() -> None:
+    simulation = simulation_of("lift")
+    force = np.array([[5.08, -2.54]])
+    simulation.step(force)
+    model = simulation.compiled.model
+    data = mujoco.MjData(model)
+    mujoco.mj_setState(model, data, simulation.snapshot().physics[0], STATE)
+    mujoco.mj_forward(model, data)
+    assert data.qfrc_actuator[:6].tolist() == [5.08, -2.54, 0.0, 0.0, 0.0, 0.0]

@@ -1,0 +1,186 @@
+"""A run leaves everything it promises, and a killed one goes on as if nothing had happened."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from roller_env.training.config import TrainingConfig
+from roller_env.training.files import RunError, RunFiles
+from roller_env.training.logs import STEPS, read_progress
+from roller_env.training.policy import TrainedPolicy, load_policy
+from roller_env.training.ppo import learn, make_environments, new_model
+from roller_env.training.run import evaluate_policy, train
+from tests.training.small import UPDATES, small_config
+
+ROOT = Path(__file__).parents[2]
+TIMEOUT_S = 120.0
+
+
+@pytest.fixture(autouse=True)
+def _one_thread_of_torch() -> Iterator[None]:
+    """Leave torch as it was: a training sets the process's number of threads."""
+    threads = torch.get_num_threads()
+    yield
+    torch.set_num_threads(threads)
+
+
+def command(config: Path, runs: Path) -> list[str]:
+    script = str(ROOT / "scripts" / "train.py")
+    options = ["--config", str(config), "--runs", str(runs), "--name", "run", "--resume"]
+    return [sys.executable, script, *options]
+
+
+def start(config: Path, runs: Path) -> subprocess.Popen[str]:
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(
+        command(config, runs),
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+def finish(process: subprocess.Popen[str]) -> str:
+    output, _ = process.communicate(timeout=TIMEOUT_S)
+    assert process.returncode == 0, output
+    return output
+
+
+def kill_once(process: subprocess.Popen[str], file: Path, rows: int) -> None:
+    """Kill a training, without warning, when its log has so many rows."""
+    deadline = time.monotonic() + TIMEOUT_S
+    while len(read_progress(file)) < rows:
+        assert process.poll() is None, process.communicate()[0]
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    assert process.returncode == -signal.SIGKILL
+
+
+def without_clock(file: Path) -> list[dict[str, str]]:
+    clocks = ("time/fps", "time/wall_s")
+    return [
+        {name: value for name, value in row.items() if name not in clocks}
+        for row in read_progress(file)
+    ]
+
+
+def test_a_training_killed_and_resumed_ends_with_the_bits_of_one_that_never_stopped(
+    tmp_path: Path,
+) -> None:
+    # Long enough that the kill comes in the middle, whatever the machine does.
+    config = small_config(total_steps=8 * 16 * 60)
+    config_file = tmp_path / "training.yaml"
+    config_file.write_text(config.to_yaml())
+    whole = RunFiles(tmp_path / "whole")
+    model, _ = learn(config, whole)
+
+    files = RunFiles(tmp_path / "runs" / "run")
+    kill_once(start(config_file, tmp_path / "runs"), files.progress, rows=8)
+    assert len(read_progress(files.progress)) < 60
+    # What a process killed while it writes a checkpoint leaves behind.
+    files.checkpoint.with_name("checkpoint.zip.tmp").write_bytes(b"half a check")
+    finish(start(config_file, tmp_path / "runs"))
+
+    assert json.loads(files.summary.read_text())["progress"]["steps"] == config.total_steps
+    assert without_clock(files.progress) == without_clock(whole.progress)
+    assert [int(row[STEPS]) for row in read_progress(files.progress)] == list(
+        range(128, config.total_steps + 1, 128)
+    )
+    resumed = load_policy(files.directory)
+    for name, value in model.policy.state_dict().items():
+        assert torch.equal(resumed.network.state_dict()[name], value), name
+
+    again = finish(start(config_file, tmp_path / "runs"))
+    assert "is finished already" in again
+    assert str(files.policy) in again
+
+
+def test_a_little_training_on_the_flat_level_finds_the_way_and_leaves_every_file(
+    tmp_path: Path,
+) -> None:
+    config = TrainingConfig.model_validate(
+        {
+            "level": "flat",
+            "environment": {"reward": "shaped", "physics": "fast"},
+            "num_envs": 64,
+            "total_steps": 64 * 32 * 40,
+            "evaluation_episodes": 20,
+            "ppo": {"rollout_steps": 32, "batch_size": 512, "learning_rate": 3e-3},
+        }
+    )
+    run = train(config, tmp_path / "run")
+    trained = evaluate_policy(load_policy(run.files.directory), config, 20)
+    untrained_model = new_model(config, make_environments(config, 1, 0))
+    normaliser = untrained_model.get_vec_normalize_env()
+    assert normaliser is not None
+    untrained = evaluate_policy(TrainedPolicy(untrained_model, normaliser, config), config, 20)
+    assert trained.table()["success rate"].mean >= 0.9
+    assert untrained.table()["success rate"].mean <= 0.5
+
+    files = run.files
+    assert json.loads(files.evaluation.read_text())["measures"]["success rate"]["mean"] >= 0.9
+    assert files.evaluation_table.read_text().startswith("20 episodes on `flat` (12 coins)")
+    assert len(files.episodes.read_text().splitlines()) == 1 + 20
+    assert files.learning_curve.read_bytes().startswith(b"\x89PNG")
+    assert files.paths.read_bytes().startswith(b"\x89PNG")
+    assert len(read_progress(files.progress)) == 40
+    assert list(files.tensorboard.iterdir())
+    assert run.summary["steps_per_s"] > 0
+
+
+def test_a_run_is_not_overwritten_by_another(tmp_path: Path) -> None:
+    files = RunFiles(tmp_path)
+    files.config.write_text(small_config().to_yaml())
+    with pytest.raises(RunError, match="--resume goes on with it"):
+        train(small_config(), tmp_path)
+    with pytest.raises(RunError, match=r"another configuration[^\n]*\n  seed: 3, 4"):
+        train(small_config(seed=4), tmp_path, resume=True)
+
+
+def test_a_training_stops_between_two_updates_when_its_time_is_up(tmp_path: Path) -> None:
+    config = small_config(total_steps=10**9, wall_clock_budget_s=0.5)
+    model, progress = learn(config, RunFiles(tmp_path))
+    assert progress.wall_s >= 0.5
+    assert progress.steps == model.num_timesteps
+    assert progress.steps % config.steps_per_update == 0
+    _, later = learn(config, RunFiles(tmp_path))
+    assert later == progress
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"environment": {"observation": "dict", "max_episode_steps": 40}},
+        {"environment": {"observation": "rays", "action": "keys", "max_episode_steps": 40}},
+        {"environment": {"action": "force", "max_episode_steps": 40}},
+        {"normalise_observations": False, "normalise_rewards": False},
+    ],
+    ids=["dict", "rays and keys", "force", "nothing normalised"],
+)
+def test_every_kind_of_observation_and_action_can_be_trained(
+    tmp_path: Path, changes: dict[str, Any]
+) -> None:
+    config = small_config(total_steps=8 * 16 * 2, **changes)
+    _, progress = learn(config, RunFiles(tmp_path))
+    assert progress.steps == 256
+    assert UPDATES > 2
+
+
+def test_a_run_without_a_policy_says_how_to_get_one(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match=r"has no config\.yaml; .*--resume"):
+        load_policy(tmp_path)
