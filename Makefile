@@ -2,9 +2,11 @@
 # Everything is installed into .venv with pip; no step needs root.
 
 PYTHON ?= python3
-NAME   ?= classic
-CONFIG ?= configs/ppo_classic.yaml
+LEVEL  ?= classic
+CONFIG ?= configs/ppo_$(LEVEL).yaml
 SEED   ?= 0
+# The run's directory in runs/; by default the configuration's name and the seed.
+NAME   ?=
 ARGS   ?=
 
 VENV   := .venv
@@ -19,7 +21,8 @@ READY  := $(VENV)/.ready
 help: ## show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' Makefile
 	@echo
-	@echo "  make train NAME=$(NAME) SEED=$(SEED) CONFIG=$(CONFIG) ARGS=\"\""
+	@echo "  make train LEVEL=$(LEVEL) SEED=1"
+	@echo "  make train CONFIG=my.yaml NAME=mine ARGS=\"--set ppo.gamma=0.995\""
 	@echo "  make test ARGS=\"-k gate\""
 
 setup: $(READY) ## make .venv with the pinned packages of constraints.txt
@@ -37,8 +40,9 @@ $(READY): pyproject.toml constraints.txt
 	@touch $(READY)
 	@echo "$(VENV) is ready."
 
-train: $(READY) ## train, evaluate and draw; continues an unfinished run of the same NAME
-	@$(BIN)/python scripts/train.py --config $(CONFIG) --name $(NAME) --seed $(SEED) --resume $(ARGS)
+train: $(READY) ## train, evaluate and draw; goes on with an unfinished run
+	@$(BIN)/python scripts/train.py --config $(CONFIG) --seed $(SEED) --resume \
+		$(if $(NAME),--name $(NAME)) $(ARGS)
 
 test: $(READY) ## run the tests on all processors
 	@$(BIN)/python -m pytest --numprocesses auto $(ARGS)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import os
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
+from numbers import Integral, Real
 from typing import Any, Final, Literal, get_args
 
 from roller_env.game.actions import ActionMode
@@ -13,12 +13,13 @@ from roller_env.game.cameras import MODES
 from roller_env.game.observations import ObservationMode
 from roller_env.game.rewards import RewardMode, RewardWeights
 from roller_env.level import Level
-from roller_env.physics.presets import PhysicsPreset, physics_preset
+from roller_env.physics.presets import PRESETS, PhysicsPreset, physics_preset
 
 RenderMode = Literal["rgb_array"]
 LevelSource = str | os.PathLike[str] | Level
 
 MAX_PICTURE_EDGE: Final = 4096
+MAX_ENVS: Final = 10**6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,6 +64,10 @@ class EnvConfig:
 
     def __post_init__(self) -> None:
         """Check every option, and the control step against the physics step."""
+        if not isinstance(self.level, (str, os.PathLike, Level)):
+            raise ValueError(
+                f"level: found {self.level!r}; must be a shipped level's name, a path or a Level"
+            )
         _one_of("action", self.action, get_args(ActionMode))
         _one_of("observation", self.observation, get_args(ObservationMode))
         _one_of("reward", self.reward, get_args(RewardMode))
@@ -72,20 +77,23 @@ class EnvConfig:
             raise ValueError(
                 f"reward_weights: found {self.reward_weights!r}; must be a RewardWeights"
             )
-        if not 0.0 <= self.discount <= 1.0:
-            raise ValueError(f"discount: found {self.discount}; must be from 0 to 1")
+        if not (_is_number(self.discount) and 0.0 <= self.discount <= 1.0):
+            raise ValueError(f"discount: found {self.discount!r}; must be a number from 0 to 1")
         for name in ("width", "height"):
-            _whole(name, getattr(self, name), 16, MAX_PICTURE_EDGE)
-        _whole("num_threads", self.num_threads, 0, 4096)
+            check_whole(name, getattr(self, name), 16, MAX_PICTURE_EDGE)
+        check_whole("num_threads", self.num_threads, 0, 4096)
         if self.max_episode_steps is not None:
-            _whole("max_episode_steps", self.max_episode_steps, 1, 10**9)
+            check_whole("max_episode_steps", self.max_episode_steps, 1, 10**9)
         self._check_control_dt()
 
     def _check_control_dt(self) -> None:
+        if not isinstance(self.physics, PhysicsPreset):
+            _one_of("physics", self.physics, tuple(PRESETS))
         step = physics_preset(self.physics).dt_s
-        if not (math.isfinite(self.control_dt_s) and 0.0 < self.control_dt_s <= 1.0):
+        if not (_is_number(self.control_dt_s) and 0.0 < self.control_dt_s <= 1.0):
             raise ValueError(
-                f"control_dt_s: found {self.control_dt_s}; must be more than 0 and at most 1 s"
+                f"control_dt_s: found {self.control_dt_s!r}; must be a number of seconds more than "
+                "0 and at most 1"
             )
         multiple = self.control_dt_s / step
         if round(multiple) < 1 or abs(multiple - round(multiple)) > 1e-6:
@@ -126,6 +134,15 @@ def _one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:
     raise ValueError(f"{name}: found {value!r}; allowed are {choices}{hint}")
 
 
-def _whole(name: str, value: object, low: int, high: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def check_whole(name: str, value: object, low: int, high: int) -> None:
+    """Refuse what is not a whole number from ``low`` to ``high``.
+
+    Raises:
+        ValueError: it is not; the message calls it ``name``.
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral) or not low <= int(value) <= high:
         raise ValueError(f"{name}: found {value!r}; must be a whole number from {low} to {high}")

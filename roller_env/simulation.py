@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.compile.compiled import CompiledLevel, compile_level
-from roller_env.config import EnvConfig
+from roller_env.config import MAX_ENVS, EnvConfig, check_whole
 from roller_env.game import observations, rewards, rules
 from roller_env.game.state import GameState, score_percent
 from roller_env.game.tables import LevelTable
@@ -84,10 +84,9 @@ class Simulation:
 
         Raises:
             LevelError: the level is not valid.
-            ValueError: ``num_envs`` is less than 1.
+            ValueError: ``num_envs`` is not a whole number from 1 to `MAX_ENVS`.
         """
-        if num_envs < 1:
-            raise ValueError(f"num_envs: found {num_envs}; must be at least 1")
+        check_whole("num_envs", num_envs, 1, MAX_ENVS)
         self.config = config
         self.num_envs = num_envs
         self.compiled: CompiledLevel = compile_level(load_level(config.level), config.physics)
@@ -96,9 +95,9 @@ class Simulation:
         self._level_of_row = np.zeros(num_envs, dtype=np.int64)
         self.table = self._levels.for_rows(self._level_of_row)
         self.state = GameState.initial(self.table)
-        self._stepper = Stepper(
-            self.compiled.model, num_envs, config.substeps, config.num_threads
-        )
+        # No episode has begun, so that there is nothing to step before the first reset.
+        self.state.truncated[:] = True
+        self._stepper = Stepper(self.compiled.model, num_envs, config.substeps, config.num_threads)
         self._generators = [np.random.default_rng() for _ in range(num_envs)]
         self._potential = np.zeros(num_envs)
         self._ray_directions = observations.ray_directions()
@@ -136,7 +135,7 @@ class Simulation:
     @property
     def time_s(self) -> Float64:
         """(N,) time since each episode began."""
-        return self.state.steps * self.duration_s
+        return self.state.steps.astype(np.float64) * self.duration_s
 
     def results(self, rows: Int64) -> dict[str, npt.NDArray[Any]]:
         """Return how the games in ``rows`` stand, arrays of (n,) by name.
@@ -321,9 +320,7 @@ class Simulation:
 
     def _cast_rays(self, rows: Int64 | None, ball: Float64, table: LevelTable) -> Float32:
         body = self.compiled.ball_body
-        level_origins = np.broadcast_to(
-            ball[:, None, :], (len(ball), len(self._ray_directions), 3)
-        )
+        level_origins = np.broadcast_to(ball[:, None, :], (len(ball), len(self._ray_directions), 3))
         level_rays = self._stepper.rays(level_origins, self._ray_directions, body, rows)
         down = np.broadcast_to([0.0, 0.0, -1.0], self._scan_offsets.shape)
         scan = self._stepper.rays(ball[:, None, :] + self._scan_offsets, down, body, rows)
@@ -353,9 +350,8 @@ class Simulation:
         count = len(snapshot.physics)
         rows = np.arange(count) if rows is None else np.asarray(rows, dtype=np.int64)
         places = np.unique(rows)
-        if len(rows) != count or len(places) != count or not (
-            0 <= places.min(initial=0) and places.max(initial=0) < self.num_envs
-        ):
+        fits = len(rows) == count == len(places)
+        if not (fits and np.isin(places, np.arange(self.num_envs)).all()):
             raise ValueError(
                 f"rows: found {rows.tolist()}; needed are {count} different ones from 0 to "
                 f"{self.num_envs - 1}"

@@ -57,7 +57,7 @@ def main(arguments: Arguments) -> None:
     files = RunFiles(arguments.output)
     write_evaluation(evaluation, config, files)
     draw_paths(evaluation, files.paths)
-    record_video(policy, config, files.video)
+    record_video(policy, config, evaluation.seed, files.video)
     print(f"written to {arguments.output}")
 
 

@@ -70,7 +70,8 @@ def print_results(run: TrainingRun) -> None:
         "evaluation": files.evaluation_table,
         "episodes": files.episodes,
         "paths from above": files.paths,
-        "video": files.video,
+        # A GIF where there is no ffmpeg.
+        "video": next(files.directory.glob(f"{files.video.stem}.*"), files.video),
         "all about the run": files.summary,
     }
     for title, path in results.items():

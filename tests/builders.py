@@ -167,6 +167,5 @@ class Game:
 
     def observed(self, name: str) -> npt.NDArray[np.float32]:
         """Return one entry of the first game's observation."""
-        return split(self.simulation.observe(), STATE_ENTRIES)[name][0]
-
-
+        entry: npt.NDArray[np.float32] = split(self.simulation.observe(), STATE_ENTRIES)[name][0]
+        return entry

@@ -55,6 +55,9 @@ def compile_level(level: Level, physics: str | PhysicsPreset = "default") -> Com
     """
     preset = physics_preset(physics)
     model = build_spec(level, preset).compile()
+    # A diverging ball must be seen and ended by the simulation, not silently put back. Set here
+    # since the MJCF flag for it is one that MuJoCo before 3.3 does not load.
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     joint = model.joint(BALL)
     plates = [plate.name for plate in level.plates]
     gates = [gate.name for gate in level.gates]

@@ -24,7 +24,7 @@ Rectangle = tuple[int, int, int, int]
 
 
 def merge_solids(solids: Iterable[Solid]) -> list[Solid]:
-    """Return boxes that fill exactly the space of ``solids``, coplanar ones merged.
+    """Return boxes that fill exactly the space of ``solids``, coplanar ones merged; never more.
 
     Only axis-aligned boxes with equal vertical extent and equal material merge. The order of
     first appearance is kept, so equal levels give equal models.
@@ -67,9 +67,12 @@ def _merge_slab(boxes: Sequence[Solid]) -> list[Solid]:
     )
     for x0, x1, y0, y1 in columns:
         filled[x0:x1, y0:y1] = True
+    rectangles = cover(filled)
+    if len(rectangles) > len(boxes):  # as for two boxes that cross
+        return list(boxes)
     first = boxes[0]
     result = []
-    for x0, x1, y0, y1 in cover(filled):
+    for x0, x1, y0, y1 in rectangles:
         corner = np.array([xs[x0], ys[y0]]) * GRID_M
         opposite = np.array([xs[x1], ys[y1]]) * GRID_M
         middle, extent = (corner + opposite) / 2, (opposite - corner) / 2

@@ -65,8 +65,6 @@ def _set_options(spec: mujoco.MjSpec, level: Level, preset: PhysicsPreset) -> No
     option.tolerance = preset.tolerance
     # MuJoCo 4.0.0's sparse Newton Hessian is wrong (fixed in 4.0.1), and "auto" may choose it.
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    # A diverging ball must be seen and ended by the simulation, not silently put back.
-    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
 
 
 def _add_ball(spec: mujoco.MjSpec, level: Level) -> None:
@@ -99,7 +97,7 @@ def _contact(level: Level, preset: PhysicsPreset, material: Material) -> dict[st
     parameters = contact_parameters(
         friction=level.ball.friction * material.friction,
         elasticity=level.ball.elasticity * material.elasticity,
-        dt_s=preset.dt_s,
+        preset=preset,
     )
     return {
         "contype": 0,
@@ -172,7 +170,11 @@ def _add_mover(
     servo = spec.add_actuator(
         name=piece.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=piece.name
     )
-    servo.set_to_intvelocity(kp=kp, kv=2.0 * mass * SERVO_FREQUENCY)
+    # MuJoCo's intvelocity, spelt out: the shortcut would write an attribute that 3.x does not know.
+    servo.dyntype = mujoco.mjtDyn.mjDYN_INTEGRATOR
+    servo.gainprm[0] = kp
+    servo.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+    servo.biasprm[1:3] = [-kp, -2.0 * mass * SERVO_FREQUENCY]
     servo.actlimited = True
     servo.actrange = [travel, 0.0]
 

@@ -15,26 +15,36 @@ from typing import Any, Final
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from roller_env.compile import textures
 from roller_env.compile.merge import merge_solids
 from roller_env.compile.mjcf import BALL, build_spec
-from roller_env.compile.surfaces import Surface, box_surface, full_turn, lathe, tube_surface
-from roller_env.level.expand import Solid, coin_positions, solids, tube_frame
-from roller_env.level.schema import Gate, Level, LiftPad, Plate
+from roller_env.compile.surfaces import Surface, box_surfaces, full_turn, lathe, tube_surface
+from roller_env.level.expand import Solid, coin_positions, rotation_matrix, solids, tube_frame
+from roller_env.level.schema import Gate, Level, LiftPad, Material, Plate, Tube
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.units import quants
+
+Float64 = npt.NDArray[np.float64]
 
 IDLE: Final = "idle"
 ACTIVE: Final = "active"
 DONE: Final = "done"
-"""Names of the materials in which plates, gates and pads tell their state."""
+STATES: Final = {
+    "plate": (IDLE, ACTIVE, DONE),
+    "gate": (IDLE, ACTIVE, DONE),
+    "pad": (IDLE, ACTIVE),
+}
+"""The states that plates, gates and pads tell by their material, which is called kind/state."""
 
 SPARKS: Final = 38
 """Particles of the finish alive at once: one a frame of 1/60 s, 0.625 s long."""
 
 RING_SPACING_M: Final = quants(96.0)
 """Distance between the bands that run along a tube."""
+
+GATE_BARS: Final = 7
 
 _HIDDEN_GROUP: Final = 4
 """Geoms of the physics that a surface is drawn for; MuJoCo leaves this group out by default."""
@@ -116,7 +126,6 @@ def _set_view(spec: mujoco.MjSpec) -> None:
     visual.headlight.ambient = [0.34, 0.36, 0.40]
     visual.headlight.diffuse = [0.10, 0.10, 0.10]
     visual.headlight.specular = [0.0, 0.0, 0.0]
-    visual.quality.shadowsize = 2048
 
 
 def _add_sky_and_sun(spec: mujoco.MjSpec) -> None:
@@ -144,18 +153,18 @@ def _add_sky_and_sun(spec: mujoco.MjSpec) -> None:
 def _add_state_materials(spec: mujoco.MjSpec) -> None:
     _add_material(spec, "plate/" + IDLE, "#ffb02e", emission=0.25)
     _add_material(spec, "plate/" + ACTIVE, "#ff6a3d", emission=0.7)
-    _add_material(spec, "plate/" + DONE, "#43d17c", emission=0.5)
+    _add_material(spec, "plate/" + DONE, "#35c46f", emission=0.3)
     _add_material(spec, "gate/" + IDLE, "#ff4d4d", emission=0.5)
     _add_material(spec, "gate/" + ACTIVE, "#ffb02e", emission=0.7)
-    _add_material(spec, "gate/" + DONE, "#43d17c", emission=0.5)
+    _add_material(spec, "gate/" + DONE, "#35c46f", emission=0.3)
     _add_material(spec, "pad/" + IDLE, "#27b5e8", emission=0.25)
-    _add_material(spec, "pad/" + ACTIVE, "#aef6ff", emission=1.0)
+    _add_material(spec, "pad/" + ACTIVE, "#8decff", emission=0.7)
     _add_material(spec, "metal/", "#39424e", specular=0.6, shininess=0.6)
     _add_material(spec, "ring/", "#bff0ff59", emission=0.8)
     _add_material(spec, "collar/", "#e9eef3", specular=0.7, shininess=0.7)
     _add_material(spec, "gold/", "#ffc928", emission=0.28, specular=0.9, shininess=0.6)
     _add_material(spec, "trigger/", "#4aa3ff26", emission=0.4)
-    _add_material(spec, "beam/", "#7dffb0", emission=0.9)
+    _add_material(spec, "beam/", "#4fe39a", emission=0.35)
     _add_material(spec, "spark/", "#01ff64", emission=1.0)
 
 
@@ -168,18 +177,28 @@ def _add_ground(spec: mujoco.MjSpec, level: Level) -> None:
     for solid in merge_solids(s for s in solids(level) if not _of_tube(s)):
         by_material[solid.material].append(solid)
     for name, pieces in by_material.items():
-        _add_ground_material(spec, level, name)
-        _add_surface(spec, part("ground") + name, [box_surface(piece) for piece in pieces], name)
+        material = level.material(name)
+        _add_level_material(spec, name, material)
+        faces, edges = zip(*map(box_surfaces, pieces), strict=True)
+        _add_surface(spec, part("ground") + name, faces, name)
+        edges = tuple(edge for edge in edges if edge is not None)
+        if edges:
+            colour, _ = textures.parse_colour(material.colour)
+            _add_level_material(spec, part("edge") + name, material, textures.edge_pixels(colour))
+            _add_surface(spec, part("ground", 1) + name, edges, part("edge") + name)
 
 
 def _of_tube(solid: Solid) -> bool:
     return solid.source.startswith("tubes[")
 
 
-def _add_ground_material(spec: mujoco.MjSpec, level: Level, name: str) -> None:
-    material = level.material(name)
+def _add_level_material(
+    spec: mujoco.MjSpec, name: str, material: Material, pixels: Float64 | None = None
+) -> None:
+    """Add a level's material under ``name``, with its own pattern unless given other pixels."""
     rgb, alpha = textures.parse_colour(material.colour)
-    pixels = textures.floor_pixels(rgb, material.pattern)
+    if pixels is None:
+        pixels = textures.floor_pixels(rgb, material.pattern)
     textures.add_texture(spec, name, "2d", pixels)
     see_through = f"#ffffff{round(alpha * 255):02x}"
     _add_material(spec, name, see_through, texture=name, specular=0.15, shininess=0.4)
@@ -188,6 +207,7 @@ def _add_ground_material(spec: mujoco.MjSpec, level: Level, name: str) -> None:
 def _add_surface(
     spec: mujoco.MjSpec, name: str, surfaces: Sequence[Surface], material: str
 ) -> None:
+    """Add a surface to look at; light falls through it as far as one can see through it."""
     Surface.joined(surfaces).add_to(spec, name)
     _add(
         spec.worldbody,
@@ -195,6 +215,7 @@ def _add_surface(
         type=mujoco.mjtGeom.mjGEOM_MESH,
         meshname=name,
         material=material,
+        castshadow=bool(spec.material(material).rgba[3] == 1.0),
     )
 
 
@@ -215,38 +236,42 @@ def _add_tubes(spec: mujoco.MjSpec, level: Level) -> None:
         if not walls:
             continue
         if spec.material(tube.material) is None:
-            _add_ground_material(spec, level, tube.material)
+            _add_level_material(spec, tube.material, level.material(tube.material))
         _add_surface(spec, part("tube", number), [tube_surface(tube, walls)], tube.material)
-        if tube.opening is None:
-            _add_rings(spec, level, number)
+        if ring_count(tube):
+            _add_rings(spec, tube, number)
 
 
-def _add_rings(spec: mujoco.MjSpec, level: Level, number: int) -> None:
+def ring_count(tube: Tube) -> int:
+    """Return how many bands of light run along a tube: none along one with an opening."""
+    if tube.opening is not None:
+        return 0
+    return int(math.dist(tube.start, tube.end) / RING_SPACING_M)
+
+
+def _add_rings(spec: mujoco.MjSpec, tube: Tube, number: int) -> None:
     """Add a closed tube's collars and the bands of light that run along it."""
-    tube = level.tubes[number]
     outer = (tube.inner_radius + tube.thickness) / math.cos(math.pi / tube.sides)
-    band, collar, height = outer + quants(0.5), outer + quants(3.0), quants(6.0)
+    band, collar, height = outer + quants(0.5), outer + quants(3.0), quants(5.0)
     turn = full_turn(4 * tube.sides)
     frame = tube_frame(tube)
     frame[:, 1] = np.cross(frame[:, 2], frame[:, 0])
     orientation = np.empty(4)
     mujoco.mju_mat2Quat(orientation, frame.ravel())
-    middle = [(band, -height), (band, height)]
-    lathe(middle, turn).add_to(spec, part("ring", number))
-    ends = [(collar, -height), (collar, height), (tube.inner_radius, height)]
-    ends += [(tube.inner_radius, -height), (collar, -height)]
-    lathe(ends, turn).add_to(spec, part("collar", number))
-    for end, place in enumerate((tube.start, tube.end)):
-        _add(
-            spec.worldbody,
+    lathe([(band, -height), (band, height)], turn).add_to(spec, part("ring", number))
+    ends = [(collar, 0.0), (collar, height), (tube.inner_radius, height)]
+    ends += [(tube.inner_radius, 0.0), (collar, 0.0)]
+    # Their rims stand out of the floors that the tube ends in, just enough to be seen.
+    proud = quants(0.4)
+    for end, base in enumerate((-proud, math.dist(tube.start, tube.end) - height + proud)):
+        surface = lathe([(radius, base + z) for radius, z in ends], turn)
+        _add_surface(
+            spec,
             part("collar", number, end),
-            type=mujoco.mjtGeom.mjGEOM_MESH,
-            meshname=part("collar", number),
-            material="collar/",
-            pos=place,
-            quat=orientation,
+            [surface.moved(frame, np.array(tube.start))],
+            "collar/",
         )
-    for ring in range(int(math.dist(tube.start, tube.end) / RING_SPACING_M)):
+    for ring in range(ring_count(tube)):
         _add(
             spec.worldbody,
             part("ring", number, ring),
@@ -276,15 +301,13 @@ def _dress_gate(spec: mujoco.MjSpec, gate: Gate) -> None:
     """Give the gate's slab bars whose colour tells its state."""
     spec.geom(gate.name).material = "metal/"
     x, y, z = (edge / 2 for edge in gate.size)
-    proud = quants(1.0)
-    for bar in range(_GATE_BARS):
-        height = z * (1.0 - (2 * bar + 1) / (_GATE_BARS + 1))
-        half = [x + proud, y - proud, quants(3.0)] if x < y else [x - proud, y + proud, quants(3.0)]
-        box = _box(half, pos=[0.0, 0.0, height], material="gate/" + IDLE)
+    thickness, inset = quants(1.0), min(quants(1.0), 0.1 * max(x, y))
+    for bar in range(GATE_BARS):
+        height = z * (1.0 - (2 * bar + 1) / (GATE_BARS + 1))
+        half = (x + thickness, y - inset) if x < y else (x - inset, y + thickness)
+        size = [*half, min(quants(3.0), z / (GATE_BARS + 1))]
+        box = _box(size, pos=[0.0, 0.0, height], material="gate/" + IDLE)
         _add(spec.body(gate.name), part("gate", bar) + gate.name, **box)
-
-
-_GATE_BARS: Final = 7
 
 
 def _dress_pad(spec: mujoco.MjSpec, pad: LiftPad, number: int) -> None:
@@ -339,7 +362,7 @@ def _coin_surface(segments: int) -> Surface:
 
 
 def _add_triggers(spec: mujoco.MjSpec, level: Level) -> None:
-    """Show the one-time triggers as faint blue panes, as the original did; the others are unseen."""
+    """Show the one-time triggers as faint blue panes, like the original; the others are unseen."""
     for number, trigger in enumerate(level.camera_triggers):
         if trigger.kind == "retreat" and trigger.size is not None:
             half = [edge / 2 for edge in trigger.size]
@@ -364,10 +387,10 @@ def _add_finish(spec: mujoco.MjSpec, level: Level) -> None:
         _add(spec.worldbody, part("pillar", side), **pillar)
     half = (width + 2 * post) * span + quants(5.0) * (1.0 - span)
     half[2] = quants(10.0)
-    beam = Solid(
-        tuple(base + [0.0, 0.0, top]), tuple(half), _UPRIGHT, "chequers/", "finish"
-    )
-    _add_surface(spec, part("beam"), [box_surface(beam)], "chequers/")
+    middle = (finish.at[0], finish.at[1], float(base[2]) + top)
+    size = (float(half[0]), float(half[1]), float(half[2]))
+    beam = Solid(middle, size, rotation_matrix(), "chequers/", "finish")
+    _add_surface(spec, part("beam"), [box_surfaces(beam)[0]], "chequers/")
     for spark in range(SPARKS):
         _add(
             spec.worldbody,
@@ -378,6 +401,3 @@ def _add_finish(spec: mujoco.MjSpec, level: Level) -> None:
             material="spark/",
             castshadow=False,
         )
-
-
-_UPRIGHT: Final = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -77,28 +77,40 @@ class Surface:
         )
 
 
-def box_surface(solid: Solid) -> Surface:
-    """Return the six faces of a box; the textures of coplanar upright boxes go on unbroken."""
+def box_surfaces(solid: Solid) -> tuple[Surface, Surface | None]:
+    """Return a box's faces, and apart from them its edge if it is a slab.
+
+    A slab is wider than it is high both ways. The texture of its edge begins at the upper rim.
+    The textures of coplanar upright boxes go on unbroken from one to the next.
+    """
     half, rotation = np.array(solid.half_size), np.array(solid.rotation)
     # A tilted box has no better origin for its texture than its own middle.
     origin = np.array(solid.centre) if solid.axis_aligned else np.zeros(3)
-    faces = []
-    for axis in range(3):
-        right, up = (1, 2) if axis == 0 else (0, 2) if axis == 1 else (0, 1)
-        for sign in (-1.0, 1.0):
-            corners = np.zeros((4, 3))
-            corners[:, axis] = sign
-            corners[:, right] = (-1.0, 1.0, 1.0, -1.0)
-            corners[:, up] = (-1.0, -1.0, 1.0, 1.0)
-            corners *= half
-            normal = np.zeros((4, 3))
-            normal[:, axis] = sign
-            texture = (corners + origin)[:, [right, up]] / TILE_M
-            # x cross y is z and y cross z is x, but x cross z is -y.
-            turned = (sign < 0.0) != (axis == 1)
-            order = np.array([[0, 2, 1], [0, 3, 2]] if turned else [[0, 1, 2], [0, 2, 3]])
-            faces.append(Surface(corners, normal, texture, order))
-    return Surface.joined(faces).moved(rotation, np.array(solid.centre))
+    sides = [_box_face(half, origin, axis, sign) for axis in (0, 1) for sign in (-1.0, 1.0)]
+    flats = [_box_face(half, origin, 2, sign) for sign in (-1.0, 1.0)]
+    middle = np.array(solid.centre)
+    if half[2] >= half[:2].min():
+        return Surface.joined(sides + flats).moved(rotation, middle), None
+    edge = Surface.joined(sides)
+    edge.texture[:, 1] = (half[2] - edge.vertices[:, 2]) / TILE_M
+    return Surface.joined(flats).moved(rotation, middle), edge.moved(rotation, middle)
+
+
+def _box_face(half: Float64, origin: Float64, axis: int, sign: float) -> Surface:
+    """Return the face of a box in its own frame that looks along ``axis`` times ``sign``."""
+    right, up = ((1, 2), (0, 2), (0, 1))[axis]
+    corners = np.zeros((4, 3))
+    corners[:, axis] = sign
+    corners[:, right] = (-1.0, 1.0, 1.0, -1.0)
+    corners[:, up] = (-1.0, -1.0, 1.0, 1.0)
+    corners *= half
+    normals = np.zeros((4, 3))
+    normals[:, axis] = sign
+    texture = (corners + origin)[:, [right, up]] / TILE_M
+    # x cross y is z and y cross z is x, but x cross z is -y.
+    turned = (sign < 0.0) != (axis == 1)
+    faces = np.array([[0, 2, 1], [0, 3, 2]] if turned else [[0, 1, 2], [0, 2, 3]])
+    return Surface(corners, normals, texture, faces)
 
 
 def lathe(profile: Sequence[tuple[float, float]], angles: Float64) -> Surface:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Final, Literal
 
 import mujoco
@@ -14,6 +15,9 @@ Colour = tuple[float, float, float]
 TILE_PIXELS: Final = 256
 CUBE_PIXELS: Final = 256
 CHECKS_PER_TILE: Final = 2
+
+_RIM_SHARE: Final = 2.5 / 64.0
+"""Height of the bright rim round a slab, in tiles: two and a half quants."""
 
 _CUBE_AXES: Final = np.array(
     [
@@ -71,6 +75,16 @@ def floor_pixels(colour: Colour, pattern: str) -> Float64:
     return pixels * shade * (1.0 - strength * line) + tint * strength * line
 
 
+def edge_pixels(colour: Colour) -> Float64:
+    """Return the edge of a slab: a bright rim, and below it a darkening body."""
+    base = np.array(colour)
+    depth = (np.arange(TILE_PIXELS) + 0.5)[:, None] / TILE_PIXELS
+    body = base * np.interp(depth, [0.0, 0.25, 1.0], [0.72, 0.50, 0.34])
+    rim = np.clip((_RIM_SHARE - depth) * TILE_PIXELS, 0.0, 1.0)
+    column = rim * _towards_white(base, 0.6) + (1.0 - rim) * body
+    return np.broadcast_to(column[:, None, :], (TILE_PIXELS, TILE_PIXELS, 3)).copy()
+
+
 def chequered_pixels(squares: int) -> Float64:
     """Return a black and white board of ``squares`` by ``squares``."""
     check = np.arange(TILE_PIXELS) * squares // TILE_PIXELS
@@ -91,9 +105,11 @@ def ball_pixels(colours: tuple[Colour, Colour, Colour], wedges: int) -> Float64:
     return np.where(np.abs(height - 0.86) < 0.025, 0.15, pixels).reshape(-1, CUBE_PIXELS, 3)
 
 
+@cache
 def sky_pixels() -> Float64:
     """Return the sky's cube: deep blue overhead, haze at the horizon, a sea of cloud below."""
-    direction = cube_directions()
+    # MuJoCo hangs the sky's cube with OpenGL's y upwards.
+    direction = cube_directions()[..., [0, 2, 1]] * [1.0, -1.0, 1.0]
     up = direction[..., 2]
     stops = np.array([-1.0, -0.45, -0.08, 0.0, 0.12, 0.45, 1.0])
     colours = np.array(
@@ -119,8 +135,8 @@ def _clouds(direction: Float64) -> Float64:
     # Looking along a layer of cloud squeezes it: the layer is a plane over and under the viewer.
     flat = direction[..., :2] / (np.abs(direction[..., 2:]) + 0.25)
     total = np.zeros(direction.shape[:-1])
-    for octave in range(5):
-        for _ in range(6):
+    for octave in range(4):
+        for _ in range(5):
             angle, phase = generator.uniform(0.0, 2.0 * np.pi, 2)
             wave = np.array([np.cos(angle), np.sin(angle)]) * 2.2 * 1.9**octave
             bend = 0.6 * np.sin(flat[..., ::-1] @ wave * 0.7 + phase)
@@ -134,7 +150,8 @@ def cube_directions() -> Float64:
     rows, columns = np.meshgrid(place, place, indexing="ij")
     out, right, down = (_CUBE_AXES[:, i, None, None, :] for i in range(3))
     direction: Float64 = out + columns[..., None] * right + rows[..., None] * down
-    return direction / np.linalg.norm(direction, axis=-1, keepdims=True)
+    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+    return direction
 
 
 def _towards_white(colour: Float64, share: float) -> Float64:

@@ -1,1 +1,1 @@
-"""Thin faces over `roller_env.simulation.Simulation`: gym.Env, gym.vector.VectorEnv, SB3's VecEnv."""
+"""Thin faces over `Simulation`: gym.Env, gym.vector.VectorEnv and SB3's VecEnv."""

@@ -10,6 +10,7 @@ import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 from gymnasium.vector import AutoresetMode
+from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
@@ -70,8 +71,18 @@ class RollerVecEnv(VecEnv):
         return self.vector.simulation.compiled.level
 
     def reset(self) -> Any:
-        """Begin an episode in every row, with the seeds that `seed` was given, if any."""
-        observation, _ = self.vector.reset(seed=self._seeds)
+        """Begin an episode in every row, with what `seed` and `set_options` were given.
+
+        Raises:
+            ValueError: the rows were given different options.
+        """
+        options = self._options[0]
+        if any(other != options for other in self._options):
+            raise ValueError(
+                f"options: found {self._options}; the rows share one environment, so they must "
+                "be the same for all of them"
+            )
+        observation, _ = self.vector.reset(seed=self._seeds, options=options)
         # The base class resets its seeds and options after use, as its other children do.
         self._reset_seeds()
         self._reset_options()
@@ -169,8 +180,11 @@ class RollerVecEnv(VecEnv):
     def env_is_wrapped(
         self, wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None
     ) -> list[bool]:
-        """Say for each index that it is not wrapped."""
-        return [False for _ in self._rows(indices)]
+        """Say for each index whether it is wrapped: in what does a `Monitor`'s work, and no more.
+
+        Evaluation then takes returns from ``infos[i]["episode"]``, which no wrapper has changed.
+        """
+        return [issubclass(Monitor, wrapper_class) for _ in self._rows(indices)]
 
     def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
         """Return a picture of every row; None for each without a render mode."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -16,7 +16,7 @@ from roller_env.simulation import Simulation
 
 
 class RollerEnv(gym.Env[Any, Any]):
-    """Roll a ball with four keys over a level: coins are points, the finish ends it, so does a fall.
+    """Roll a ball over a level with four keys: coins are points, the finish or a fall ends it.
 
     The options are the keywords of `roller_env.config.EnvConfig`; the README has them in a table,
     with the observation's entries and the order of events in a step.
@@ -29,7 +29,8 @@ class RollerEnv(gym.Env[Any, Any]):
         v0: first version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 20}
+    # Gymnasium reads the class's before an environment is made, and writes none.
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
 
     def __init__(self, **options: Any):
         """Make the environment; see `roller_env.config.EnvConfig` for the options.
@@ -64,11 +65,11 @@ class RollerEnv(gym.Env[Any, Any]):
         """Advance by one control step.
 
         Raises:
-            gymnasium.error.ResetNeeded: the episode is over.
+            gymnasium.error.ResetNeeded: the episode is over, or none has begun.
             ValueError: the action is not in the action space.
         """
         if self.simulation.state.over[0]:
-            raise gym.error.ResetNeeded("step: the episode is over; call reset() first")
+            raise gym.error.ResetNeeded("step: no episode is under way; call reset() first")
         force = forces(self.config.action, np.asarray(action)[None])
         transition = self.simulation.step(force)
         terminated, truncated = bool(transition.terminated[0]), bool(transition.truncated[0])
@@ -78,7 +79,7 @@ class RollerEnv(gym.Env[Any, Any]):
             info = {name: value[0].item() for name, value in results.items()}
         return self._observation(), float(transition.reward[0]), terminated, truncated, info
 
-    def render(self) -> npt.NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> npt.NDArray[np.uint8] | None:
         """Return a picture, (height, width, 3) uint8, or None without a render mode."""
         if self.render_mode is None:
             gym.logger.warn("render: make the environment with render_mode='rgb_array'")
@@ -92,7 +93,12 @@ class RollerEnv(gym.Env[Any, Any]):
             self._renderer = None
 
     def get_keys_to_action(self) -> dict[tuple[str, ...], Any]:
-        """Return the actions of held W, A, S, D, as `gymnasium.utils.play.play` asks for them."""
+        """Return the actions of held W, A, S, D, as `gymnasium.utils.play.play` asks for them.
+
+        When none is held, `play` takes its argument ``noop``: the default, 0, is right for
+        ``directions``; for ``keys`` give it ``np.zeros(4, np.int8)``, for ``force``
+        ``np.zeros(2, np.float32)``.
+        """
         return spaces.keys_to_action(self.config.action)
 
     def _observation(self) -> Any:

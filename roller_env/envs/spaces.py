@@ -1,4 +1,4 @@
-"""Gymnasium spaces of one game, and the shapes in which actions and observations cross the border."""
+"""Gymnasium spaces of one game, and the shapes that actions and observations have there."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def observation_space(config: EnvConfig) -> Space:
     if config.observation == "pixels":
         return gym.spaces.Box(0, 255, (config.height, config.width, 3), np.uint8)
     parts = observations.entries(config.observation)
-    boxes = {
+    boxes: dict[str, Space] = {
         entry.name: gym.spaces.Box(
             np.float32(entry.low), np.float32(entry.high), (entry.size,), np.float32
         )
@@ -37,11 +37,7 @@ def observation_space(config: EnvConfig) -> Space:
     }
     if config.observation == "dict":
         return gym.spaces.Dict(boxes)
-    return gym.spaces.Box(
-        np.concatenate([box.low for box in boxes.values()]),
-        np.concatenate([box.high for box in boxes.values()]),
-        dtype=np.float32,
-    )
+    return gym.spaces.flatten_space(gym.spaces.Tuple(list(boxes.values())))
 
 
 def shape_observation(config: EnvConfig, vectors: npt.NDArray[np.float32]) -> Any:
@@ -67,9 +63,12 @@ def action_of_keys(mode: ActionMode, held: str) -> Any:
 
 
 def keys_to_action(mode: ActionMode) -> dict[tuple[str, ...], Any]:
-    """Return every combination of held keys with its action, as `gymnasium.utils.play` takes it."""
+    """Return every combination of held keys with its action, as `gymnasium.utils.play` takes it.
+
+    It refuses a combination of no keys, and takes that action as its ``noop``.
+    """
     combinations: dict[tuple[str, ...], Any] = {}
-    for bits in range(2 ** len(KEYS)):
+    for bits in range(1, 2 ** len(KEYS)):
         held = [key for index, key in enumerate(KEYS) if bits >> index & 1]
         combinations[tuple(held)] = action_of_keys(mode, "".join(held))
     return combinations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from difflib import get_close_matches
 from typing import Any
 
 import gymnasium as gym
@@ -86,8 +87,11 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         """Advance every row by one control step, resetting rows as the autoreset mode says.
 
         Raises:
-            ValueError: the actions are not in the action space, or (DISABLED) a row is over.
+            ValueError: the actions are not in the action space.
+            gymnasium.error.ResetNeeded: `reset` was never called, or (DISABLED) a row is over.
         """
+        if self._generators is None:
+            raise gym.error.ResetNeeded("step: no episode is under way; call reset() first")
         force = forces(self.config.action, actions)
         if len(force) != self.num_envs:
             raise ValueError(f"actions: found {len(force)} rows; needed are {self.num_envs}")
@@ -96,7 +100,7 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
             self.simulation.reset(np.flatnonzero(over))
             transition = self.simulation.step(force, hold=over)
         elif over.any():
-            raise ValueError(
+            raise gym.error.ResetNeeded(
                 f"step: rows {np.flatnonzero(over).tolist()} are over; reset them first with "
                 "reset(options={'reset_mask': mask})"
             )
@@ -145,10 +149,14 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         if seed is None or isinstance(seed, (int, np.integer)):
             first = seed
             seeds = [None if first is None else int(first) + row for row in range(self.num_envs)]
-        else:
+        elif isinstance(seed, (Sequence, np.ndarray)):
             seeds = list(seed)
+        else:
+            raise TypeError(f"seed: found {seed!r}; must be None, an integer or one for each row")
         if len(seeds) != self.num_envs:
-            raise ValueError(f"seed: found {len(seeds)} seeds; needed is one a row, {self.num_envs}")
+            raise ValueError(
+                f"seed: found {len(seeds)} seeds; needed is one a row, {self.num_envs}"
+            )
         generators = self._generators or [seeding.np_random(None)[0] for _ in seeds]
         for row in rows:
             if seeds[row] is not None:
@@ -211,5 +219,8 @@ def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
     for candidate in AutoresetMode:
         if mode in (candidate.name, candidate.value):
             return candidate
-    allowed = ", ".join(repr(candidate.name) for candidate in AutoresetMode)
-    raise ValueError(f"autoreset_mode: found {mode!r}; allowed are {allowed}")
+    names = [candidate.name for candidate in AutoresetMode]
+    near = get_close_matches(str(mode).upper(), names, n=1, cutoff=0.5)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    allowed = ", ".join(map(repr, names))
+    raise ValueError(f"autoreset_mode: found {mode!r}; allowed are {allowed}{hint}")

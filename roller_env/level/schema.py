@@ -421,8 +421,8 @@ class CameraTrigger(Piece):
 
     ``overhead`` (the original's ``camch``): on every entry, 1.667 s later, mode 2.
     ``retreat`` (``camch2``): on the first entry only, at once, mode 1.
-    ``first_person`` (``cam_switcher``): mode 4 while the ball's centre is within ``reach`` of
-    ``at``; it has no box.
+    ``first_person`` (``cam_switcher``): mode 4 when the ball's centre is within ``reach`` of
+    ``at``, and from then on until something else changes it; it has no box.
     """
 
     kind: Literal["overhead", "retreat", "first_person"]

@@ -22,7 +22,9 @@ _BAD_STATE = [
 
 
 class Stepper:
-    """N copies of one model's state. Bit-identical to a plain ``mj_step`` loop, at any thread count.
+    """N copies of one model's state, bit-identical to a plain ``mj_step`` loop at any thread count.
+
+    Rows are given to its methods as sorted indices without repetition.
 
     Attributes:
         qpos: (N, nq) float64, live view of the positions.

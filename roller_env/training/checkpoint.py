@@ -86,8 +86,10 @@ class Checkpoint:
         model = PPO.load(
             io.BytesIO(self.members[_MODEL]), env=normaliser, device="cpu", force_reset=False
         )
+        # Its result is replaced at once, but environments are stepped only after a reset.
+        environments.reset()
         normaliser.returns, state = pickle.loads(self.members[_ENVIRONMENTS])
-        environments.simulation.restore(state)
+        environments.restore(state)
         # Last, because loading a model seeds the generators anew.
         _set_random_state(pickle.loads(self.members[_RANDOM]))
         return model
@@ -112,7 +114,7 @@ def save_checkpoint(file: Path, model: PPO, config: TrainingConfig, progress: Pr
         _MODEL: stream.getvalue(),
         _NORMALISER: pickle.dumps(normaliser),
         # VecNormalize leaves its running returns out of its own pickle.
-        _ENVIRONMENTS: pickle.dumps((normaliser.returns, environments.simulation.snapshot())),
+        _ENVIRONMENTS: pickle.dumps((normaliser.returns, environments.snapshot())),
         _RANDOM: pickle.dumps(_random_state()),
         _PROGRESS: json.dumps(
             {"progress": asdict(progress), "config": config.model_dump(mode="json")}

@@ -83,6 +83,8 @@ class TrainingConfig(_Frozen):
         normalise_rewards: with the running variance of the discounted return.
         torch_threads: of the network's arithmetic.
         evaluation_episodes: played by the trained policy for the evaluation table.
+        evaluation_environment: options that are other ones then, such as ``physics: default``
+            after a training with ``fast``.
         ppo: what the algorithm is told.
     """
 
@@ -98,6 +100,7 @@ class TrainingConfig(_Frozen):
     normalise_rewards: bool = True
     torch_threads: PositiveInt = 1
     evaluation_episodes: Annotated[int, Field(ge=2)] = 100
+    evaluation_environment: Mapping[str, Any] = Field(default_factory=dict)
     ppo: PPOConfig = PPOConfig()
 
     @model_validator(mode="after")
@@ -117,19 +120,23 @@ class TrainingConfig(_Frozen):
             )
         return self
 
-    @field_validator("environment")
+    @field_validator("environment", "evaluation_environment")
     @classmethod
     def _environment_takes_these(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
-        for name in ("level", "discount"):
-            if name in options:
-                raise ValueError(f"{name} is the training's own to give; remove it here")
+        if "level" in options:
+            raise ValueError("level is a field of the training itself; remove it here")
         make_config(**_with_weights(options))
         return options
 
     @property
     def environment_options(self) -> dict[str, Any]:
-        """The options of the environments, with the discount the learner uses."""
+        """The options of the training's environments; they discount as the learner does."""
         return {"discount": self.ppo.gamma, **_with_weights(self.environment)}
+
+    @property
+    def evaluation_options(self) -> dict[str, Any]:
+        """The options of the evaluation's environments."""
+        return self.environment_options | _with_weights(self.evaluation_environment)
 
     @property
     def steps_per_update(self) -> int:

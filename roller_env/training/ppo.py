@@ -34,13 +34,14 @@ def learn(config: TrainingConfig, files: RunFiles) -> tuple[PPO, Progress]:
 
     Args:
         config: of the training.
-        files: where checkpoint and logs are.
+        files: where checkpoint and logs are or go.
 
     Returns:
         The learner, its environments inside, and how far it came.
     """
+    files.directory.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(config.torch_threads)
-    environments = make_environments(config, config.num_envs, config.seed)
+    environments = make_environments(config)
     if files.checkpoint.exists():
         checkpoint = load_checkpoint(files.checkpoint)
         model, progress = checkpoint.restore(environments), checkpoint.progress
@@ -77,9 +78,11 @@ def is_complete(config: TrainingConfig, progress: Progress) -> bool:
     return progress.steps >= config.total_steps or out_of_time
 
 
-def make_environments(config: TrainingConfig, num_envs: int, seed: int) -> RollerVecEnv:
-    """Return environments as a configuration wants them."""
-    return RollerVecEnv(config.level, num_envs, seed=seed, **config.environment_options)
+def make_environments(config: TrainingConfig) -> RollerVecEnv:
+    """Return the environments that a configuration trains in."""
+    return RollerVecEnv(
+        config.level, config.num_envs, seed=config.seed, **config.environment_options
+    )
 
 
 def new_model(config: TrainingConfig, environments: RollerVecEnv) -> PPO:
@@ -116,7 +119,7 @@ def new_model(config: TrainingConfig, environments: RollerVecEnv) -> PPO:
     )
 
 
-class _BudgetSpent(Exception):  # noqa: N818  not an error
+class _BudgetSpent(Exception):
     """Leaves SB3's loop between two updates, which a callback's False cannot."""
 
 

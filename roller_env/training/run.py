@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import Any, Final
 
 from roller_env import __version__
+from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.training.checkpoint import Progress
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.evaluate import Evaluation, evaluate, rows_and_repeats
 from roller_env.training.files import RunError, RunFiles, only_one_process, write_atomically
 from roller_env.training.pictures import draw_paths, record_video
 from roller_env.training.policy import Policy, load_policy, save_policy
-from roller_env.training.ppo import learn, make_environments
+from roller_env.training.ppo import learn
 from roller_env.training.report import draw_learning_curve, markdown_table, write_evaluation
 
 EVALUATION_SEED_OFFSET: Final = 1_000_000
@@ -45,7 +46,7 @@ class TrainingRun:
 def train(config: TrainingConfig, directory: Path, *, resume: bool = False) -> TrainingRun:
     """Train, evaluate and draw; every file of `RunFiles` is there afterwards.
 
-    A video and the picture of the paths are left out, and said to be, where nothing can draw them.
+    The video is left out, and said to be, where no OpenGL library is found.
 
     Args:
         config: of the training.
@@ -71,7 +72,7 @@ def train(config: TrainingConfig, directory: Path, *, resume: bool = False) -> T
         print(markdown_table(evaluation, config), flush=True)
         draw_learning_curve(config, evaluation.coins_in_level, files)
         draw_paths(evaluation, files.paths)
-        record_video(policy, config, files.video)
+        record_video(policy, config, evaluation.seed, files.video)
         summary = _summary(config, progress, time.monotonic() - start_s)
         write_atomically(files.summary, json.dumps(summary, indent=2) + "\n")
         return TrainingRun(files, summary, was_finished=False)
@@ -80,17 +81,17 @@ def train(config: TrainingConfig, directory: Path, *, resume: bool = False) -> T
 def evaluate_policy(
     policy: Policy, config: TrainingConfig, episodes: int, seed: int | None = None
 ) -> Evaluation:
-    """Play at least `episodes` whole episodes of what a configuration trains on.
+    """Play at least `episodes` whole episodes in a configuration's evaluation environment.
 
     Args:
         policy: what plays.
-        config: says where; its level may be another than the one trained on.
+        config: says where; it may be another than the policy was trained with.
         episodes: rounded up so that all rows play equally many.
         seed: of the environments; by default one the training never used.
     """
     rows, repeats = rows_and_repeats(episodes)
     seed = config.seed + EVALUATION_SEED_OFFSET if seed is None else seed
-    environments = make_environments(config, rows, seed)
+    environments = RollerVecEnv(config.level, rows, **config.evaluation_options)
     try:
         return evaluate(policy, environments, seed=seed, episodes_per_row=repeats)
     finally:

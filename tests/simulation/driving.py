@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import mujoco
 import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
@@ -55,6 +56,21 @@ def along_the_route(simulation: Simulation) -> Float64:
     return KEY_FORCE_N * np.clip(away - velocity, -1.0, 1.0)
 
 
+def plain_data(model: mujoco.MjModel, state: Float64) -> mujoco.MjData:
+    """Return MuJoCo's own data in one of a snapshot's ``physics`` states."""
+    data = mujoco.MjData(model)
+    mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+    return data
+
+
+def force_on_ball(simulation: Simulation) -> list[float]:
+    """Return the newtons, x, y and z, with which the motors pushed the first ball."""
+    compiled = simulation.compiled
+    data = plain_data(compiled.model, simulation.snapshot().physics[0])
+    force: list[float] = data.ctrl[compiled.force_ctrl].tolist()
+    return force
+
+
 def bits(simulation: Simulation) -> list[bytes]:
     """Return, row by row, all that a simulation's future depends on."""
     return [bits_of_row(simulation.snapshot(), row) for row in range(simulation.num_envs)]
@@ -63,4 +79,5 @@ def bits(simulation: Simulation) -> list[bytes]:
 def bits_of_row(snapshot: Snapshot, row: int) -> bytes:
     """Return all that the future of one of a snapshot's rows depends on."""
     game = b"".join(values[row].tobytes() for values in snapshot.game.values())
-    return snapshot.physics[row].tobytes() + game + repr(snapshot.generators[row]).encode()
+    physics: bytes = snapshot.physics[row].tobytes()
+    return physics + game + repr(snapshot.generators[row]).encode()

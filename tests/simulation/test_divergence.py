@@ -3,6 +3,7 @@ from __future__ import annotations
 import re
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,7 +14,7 @@ from roller_env.config import EnvConfig
 from roller_env.level import Level
 from roller_env.simulation import Simulation, Transition
 from tests.builders import coin, make_level, resting
-from tests.simulation.driving import bits, simulation_of, wandering
+from tests.simulation.driving import bits, plain_data, simulation_of, wandering
 
 POISONS = {
     "nan_velocity": (True, np.nan),
@@ -48,10 +49,11 @@ def diverge(simulation: Simulation) -> Transition:
         return simulation.step(np.zeros((simulation.num_envs, 2)))
 
 
-@pytest.mark.parametrize("observation", ["state", "rays"])
 @pytest.mark.parametrize("kind", POISONS)
-def test_a_diverging_game_ends_alone(kind: str, observation: str) -> None:
-    options = {"reward": "shaped", "observation": observation, "num_threads": 2}
+def test_a_diverging_game_ends_alone(kind: str) -> None:
+    # A position that is wrong from the start has no potential to begin the shaping with.
+    reward = "shaped" if POISONS[kind][0] else "points"
+    options: dict[str, Any] = {"reward": reward, "observation": "rays", "num_threads": 2}
     poisoned = simulation_of("gate", num_envs=4, **options)
     healthy = simulation_of("gate", num_envs=4, **options)
     for force, _ in zip(wandering(4), range(10), strict=False):
@@ -125,8 +127,7 @@ def test_the_report_repeats_the_divergence(reports: Path) -> None:
     assert len(state) == len(ctrl) == 2
     model = compile_level(level, "fast").model
     for row in range(2):
-        data = mujoco.MjData(model)
-        mujoco.mj_setState(model, data, state[row], mujoco.mjtState.mjSTATE_INTEGRATION)
+        data = plain_data(model, state[row])
         data.ctrl[:] = ctrl[row]
         assert data.ctrl[simulation.compiled.force_ctrl].tolist() == [1.0, 1.0, 0.0]
         mujoco.mj_step(model, data)

@@ -5,17 +5,15 @@ import numpy as np
 import pytest
 
 from roller_env.level import shipped_levels
-from tests.simulation.driving import along_the_route, simulation_of, wandering
+from tests.simulation.driving import (
+    along_the_route,
+    force_on_ball,
+    plain_data,
+    simulation_of,
+    wandering,
+)
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
-
-
-def plain_copies(model: mujoco.MjModel, states: np.ndarray) -> list[mujoco.MjData]:
-    """Return one MjData for each row of integration states."""
-    copies = [mujoco.MjData(model) for _ in states]
-    for data, state in zip(copies, states, strict=True):
-        mujoco.mj_setState(model, data, state, STATE)
-    return copies
 
 
 @pytest.mark.parametrize("physics", ["fast", "default", "accurate"])
@@ -25,7 +23,7 @@ def test_a_step_is_a_loop_of_mj_step_bit_for_bit(level: str, physics: str) -> No
         level, num_envs=3, physics=physics, reward="shaped", control_dt_s=1 / 20, num_threads=2
     )
     model, substeps = simulation.compiled.model, simulation.config.substeps
-    copies = plain_copies(model, simulation.snapshot().physics)
+    copies = [plain_data(model, state) for state in simulation.snapshot().physics]
     wander = wandering(num_envs=3)
     state = np.empty(mujoco.mj_stateSize(model, STATE))
     for _ in range(40 if physics == "accurate" else 150):
@@ -36,20 +34,14 @@ def test_a_step_is_a_loop_of_mj_step_bit_for_bit(level: str, physics: str) -> No
         after = simulation.snapshot().physics
         for row in np.flatnonzero(stepped):
             # The controls that a step set are part of the state that it left.
-            mujoco.mj_setState(model, expected := mujoco.MjData(model), after[row], STATE)
-            copies[row].ctrl[:] = expected.ctrl
+            copies[row].ctrl[:] = plain_data(model, after[row]).ctrl
             for _ in range(substeps):
                 mujoco.mj_step(model, copies[row])
             mujoco.mj_getState(model, copies[row], state, STATE)
             assert state.tobytes() == after[row].tobytes()
 
 
-def test_the_keys_and_the_lift_are_newtons_on_the_ball() -> None:
+def test_the_keys_are_newtons_on_the_ball() -> None:
     simulation = simulation_of("lift")
-    force = np.array([[5.08, -2.54]])
-    simulation.step(force)
-    model = simulation.compiled.model
-    data = mujoco.MjData(model)
-    mujoco.mj_setState(model, data, simulation.snapshot().physics[0], STATE)
-    mujoco.mj_forward(model, data)
-    assert data.qfrc_actuator[:6].tolist() == [5.08, -2.54, 0.0, 0.0, 0.0, 0.0]
+    simulation.step(np.array([[5.08, -2.54]]))
+    assert force_on_ball(simulation) == [5.08, -2.54, 0.0]

@@ -11,7 +11,11 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from stable_baselines3 import PPO
+from stable_baselines3.common.running_mean_std import RunningMeanStd
+from stable_baselines3.common.vec_env import VecNormalize
 
+from roller_env.envs.sb3 import RollerVecEnv
+from roller_env.simulation import Snapshot
 from roller_env.training.checkpoint import (
     Checkpoint,
     CheckpointError,
@@ -32,8 +36,19 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[PPO, Checkpoint, 
 
 
 def restored(checkpoint: Checkpoint) -> PPO:
-    config = checkpoint.config
-    return checkpoint.restore(make_environments(config, config.num_envs, seed=999))
+    return checkpoint.restore(make_environments(checkpoint.config.model_copy(update={"seed": 9})))
+
+
+def normaliser(model: PPO) -> VecNormalize:
+    found = model.get_vec_normalize_env()
+    assert found is not None
+    return found
+
+
+def games(model: PPO) -> Snapshot:
+    environments = normaliser(model).venv
+    assert isinstance(environments, RollerVecEnv)
+    return environments.simulation.snapshot()
 
 
 def test_weights_and_optimizer_come_back_bit_for_bit(
@@ -53,14 +68,13 @@ def test_weights_and_optimizer_come_back_bit_for_bit(
 
 def test_normalisation_comes_back_bit_for_bit(trained: tuple[PPO, Checkpoint, Path]) -> None:
     model, checkpoint, _ = trained
-    before, after = model.get_vec_normalize_env(), restored(checkpoint).get_vec_normalize_env()
-    assert before is not None
-    assert after is not None
-    for statistics in ("obs_rms", "ret_rms"):
-        for part in ("mean", "var", "count"):
-            was = getattr(getattr(before, statistics), part)
-            assert np.array_equal(was, getattr(getattr(after, statistics), part))
-    assert before.obs_rms.count > 1
+    before, after = normaliser(model), normaliser(restored(checkpoint))
+    for was, now in ((before.obs_rms, after.obs_rms), (before.ret_rms, after.ret_rms)):
+        assert isinstance(was, RunningMeanStd)
+        assert isinstance(now, RunningMeanStd)
+        assert was.count == now.count > 1
+        assert np.array_equal(was.mean, now.mean)
+        assert np.array_equal(was.var, now.var)
     assert np.array_equal(before.returns, after.returns)
 
 
@@ -70,12 +84,14 @@ def test_games_and_counters_come_back_where_they_were(
     model, checkpoint, _ = trained
     again = restored(checkpoint)
     assert again.num_timesteps == model.num_timesteps == checkpoint.progress.steps
+    assert isinstance(again._last_obs, np.ndarray)
+    assert isinstance(model._last_obs, np.ndarray)
     assert np.array_equal(again._last_obs, model._last_obs)
-    was, is_now = (learner.get_env().venv.simulation.snapshot() for learner in (model, again))
-    assert np.array_equal(was.physics, is_now.physics)
-    assert was.generators == is_now.generators
+    was, now = games(model), games(again)
+    assert np.array_equal(was.physics, now.physics)
+    assert was.generators == now.generators
     for name, values in was.game.items():
-        assert np.array_equal(values, is_now.game[name]), name
+        assert np.array_equal(values, now.game[name]), name
 
 
 def test_random_generators_come_back_where_they_were(
@@ -108,12 +124,11 @@ def test_a_checkpoint_with_any_byte_wrong_or_missing_is_refused(
     tmp_path_factory: pytest.TempPathFactory,
     data: st.DataObject,
 ) -> None:
-    content = trained[2].read_bytes()
-    place = data.draw(st.integers(0, len(content) - 1))
+    damaged = bytearray(trained[2].read_bytes())
+    place = data.draw(st.integers(0, len(damaged) - 1))
     if data.draw(st.booleans()):
-        damaged = content[:place]
+        del damaged[place:]
     else:
-        damaged = bytearray(content)
         damaged[place] ^= data.draw(st.integers(1, 255))
     file = tmp_path_factory.mktemp("damaged") / "checkpoint.zip"
     file.write_bytes(damaged)

@@ -54,6 +54,12 @@ def test_the_environment_shapes_rewards_with_the_discount_of_the_learner() -> No
     assert options["discount"] == 0.97
 
 
+def test_the_evaluation_may_be_held_elsewhere_than_the_training() -> None:
+    config = small_config(evaluation_environment={"physics": "default"})
+    assert config.environment_options["physics"] == "fast"
+    assert config.evaluation_options == config.environment_options | {"physics": "default"}
+
+
 def test_reward_weights_are_given_by_name() -> None:
     config = small_config(environment={"reward_weights": {"coin": 2.0}})
     assert config.environment_options["reward_weights"] == RewardWeights(coin=2.0)
@@ -75,7 +81,7 @@ def test_reward_weights_are_given_by_name() -> None:
         ("level: flat\nppo: {batch_size: 5000}", "ppo.batch_size 5000 does not divide the 32768"),
         ("level: flat\nenvironment: {rewrad: shaped}", "did you mean 'reward'?"),
         ("level: flat\nenvironment: {reward: shapely}", "did you mean 'shaped'?"),
-        ("level: flat\nenvironment: {discount: 0.9}", "discount is the training's own to give"),
+        ("level: flat\nenvironment: {level: gate}", "level is a field of the training itself"),
         ("level: flat\nenvironment: {reward_weights: {coins: 1}}", "did you mean 'coin'?"),
         ("level: flat\nenvironment: {reward_weights: 3}", "reward_weights: expected any of 'coin'"),
         ("level: [", "not YAML"),

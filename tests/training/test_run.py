@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 import torch
 
+from roller_env.drawing.opengl import missing_opengl
 from roller_env.training.config import TrainingConfig
 from roller_env.training.files import RunError, RunFiles
 from roller_env.training.logs import STEPS, read_progress
@@ -83,15 +84,15 @@ def test_a_training_killed_and_resumed_ends_with_the_bits_of_one_that_never_stop
     tmp_path: Path,
 ) -> None:
     # Long enough that the kill comes in the middle, whatever the machine does.
-    config = small_config(total_steps=8 * 16 * 60)
+    config = small_config(total_steps=8 * 16 * 40)
     config_file = tmp_path / "training.yaml"
     config_file.write_text(config.to_yaml())
     whole = RunFiles(tmp_path / "whole")
     model, _ = learn(config, whole)
 
     files = RunFiles(tmp_path / "runs" / "run")
-    kill_once(start(config_file, tmp_path / "runs"), files.progress, rows=8)
-    assert len(read_progress(files.progress)) < 60
+    kill_once(start(config_file, tmp_path / "runs"), files.progress, rows=5)
+    assert len(read_progress(files.progress)) < 40
     # What a process killed while it writes a checkpoint leaves behind.
     files.checkpoint.with_name("checkpoint.zip.tmp").write_bytes(b"half a check")
     finish(start(config_file, tmp_path / "runs"))
@@ -105,9 +106,9 @@ def test_a_training_killed_and_resumed_ends_with_the_bits_of_one_that_never_stop
     for name, value in model.policy.state_dict().items():
         assert torch.equal(resumed.network.state_dict()[name], value), name
 
-    again = finish(start(config_file, tmp_path / "runs"))
-    assert "is finished already" in again
-    assert str(files.policy) in again
+    again = train(config, files.directory, resume=True)
+    assert again.was_finished
+    assert again.summary == json.loads(files.summary.read_text())
 
 
 def test_a_little_training_on_the_flat_level_finds_the_way_and_leaves_every_file(
@@ -118,14 +119,14 @@ def test_a_little_training_on_the_flat_level_finds_the_way_and_leaves_every_file
             "level": "flat",
             "environment": {"reward": "shaped", "physics": "fast"},
             "num_envs": 64,
-            "total_steps": 64 * 32 * 40,
+            "total_steps": 64 * 32 * 24,
             "evaluation_episodes": 20,
             "ppo": {"rollout_steps": 32, "batch_size": 512, "learning_rate": 3e-3},
         }
     )
     run = train(config, tmp_path / "run")
     trained = evaluate_policy(load_policy(run.files.directory), config, 20)
-    untrained_model = new_model(config, make_environments(config, 1, 0))
+    untrained_model = new_model(config, make_environments(config))
     normaliser = untrained_model.get_vec_normalize_env()
     assert normaliser is not None
     untrained = evaluate_policy(TrainedPolicy(untrained_model, normaliser, config), config, 20)
@@ -138,9 +139,11 @@ def test_a_little_training_on_the_flat_level_finds_the_way_and_leaves_every_file
     assert len(files.episodes.read_text().splitlines()) == 1 + 20
     assert files.learning_curve.read_bytes().startswith(b"\x89PNG")
     assert files.paths.read_bytes().startswith(b"\x89PNG")
-    assert len(read_progress(files.progress)) == 40
+    assert len(read_progress(files.progress)) == 24
     assert list(files.tensorboard.iterdir())
     assert run.summary["steps_per_s"] > 0
+    if missing_opengl() is None:
+        assert b"ftyp" in files.video.read_bytes()[:16]
 
 
 def test_a_run_is_not_overwritten_by_another(tmp_path: Path) -> None:

@@ -1,0 +1,152 @@
+"""Films of episodes, with points and time written on them."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageDraw, ImageFont
+
+from roller_env.drawing.canvas import Picture
+from roller_env.drawing.renderer import GameRenderer
+from roller_env.simulation import Simulation
+
+Float64 = npt.NDArray[np.float64]
+
+END_S: Final = 1.0
+"""How long a film of an episode stands still at its end."""
+
+_MP4_QUALITY: Final = 8
+"""On imageio-ffmpeg's scale from 0 to 10; below 7 the chequered floors smear."""
+
+
+def write_video(frames: Iterable[Picture], file: Path, fps: int) -> Path:
+    """Write pictures as an MP4 film, or as a GIF where there is no ffmpeg.
+
+    Args:
+        frames: (H, W, 3) uint8, of equal and even sizes.
+        file: where to; a suffix ``.gif`` asks for a GIF.
+        fps: pictures a second.
+
+    Returns:
+        The path written: ``file``, with the suffix ``.gif`` in place of its own without ffmpeg.
+
+    Raises:
+        ValueError: there are no frames.
+    """
+    iterator = iter(frames)
+    first = next(iterator, None)
+    if first is None:
+        raise ValueError("frames: found none; a film has at least one")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    if file.suffix == ".gif" or not _has_ffmpeg():
+        file = file.with_suffix(".gif")
+        _write_gif(first, iterator, file, fps)
+    else:
+        _write_mp4(first, iterator, file, fps)
+    return file
+
+
+def _has_ffmpeg() -> bool:
+    """Say whether imageio-ffmpeg is here and brought, or finds, an ffmpeg for this machine."""
+    try:
+        importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe()
+    except (ImportError, RuntimeError):
+        return False
+    return True
+
+
+def _write_mp4(first: Picture, others: Iterator[Picture], file: Path, fps: int) -> None:
+    height, width, _ = first.shape
+    imageio_ffmpeg = importlib.import_module("imageio_ffmpeg")
+    writer = imageio_ffmpeg.write_frames(
+        str(file), (width, height), fps=fps, quality=_MP4_QUALITY, macro_block_size=2
+    )
+    writer.send(None)
+    try:
+        for frame in chain([first], others):
+            writer.send(np.ascontiguousarray(frame))
+    finally:
+        writer.close()
+
+
+def _write_gif(first: Picture, others: Iterator[Picture], file: Path, fps: int) -> None:
+    Image.fromarray(first).save(
+        file,
+        save_all=True,
+        append_images=(Image.fromarray(frame) for frame in others),
+        duration=round(1000 / fps),
+        loop=0,
+    )
+
+
+def record_episode(
+    simulation: Simulation,
+    act: Callable[[Simulation], Float64],
+    file: Path,
+    camera: int | Literal["game"] = "game",
+    size: tuple[int, int] = (480, 320),
+) -> Path:
+    """Film the game in row 0, from how it stands now to its end.
+
+    Args:
+        simulation: the games; all are stepped until that in row 0 is over.
+        act: gives the keys' force, (N, 2) newtons, for the next step.
+        file: where to; see `write_video`.
+        camera: a camera mode, or "game" for the one that the game sets.
+        size: width and height in pixels, both even.
+
+    Returns:
+        The path written.
+
+    Raises:
+        DrawingUnavailable: there is no OpenGL here.
+    """
+    fps = round(1.0 / simulation.duration_s)
+    renderer = GameRenderer(simulation, *size)
+    try:
+        return write_video(_frames(simulation, act, renderer, camera, fps), file, fps)
+    finally:
+        renderer.close()
+
+
+def _frames(
+    simulation: Simulation,
+    act: Callable[[Simulation], Float64],
+    renderer: GameRenderer,
+    camera: int | Literal["game"],
+    fps: int,
+) -> Iterator[Picture]:
+    frame = with_panel(renderer.render(0, camera), simulation)
+    yield frame
+    while not simulation.state.over[0]:
+        simulation.step(act(simulation))
+        frame = with_panel(renderer.render(0, camera), simulation)
+        yield frame
+    for _ in range(round(END_S * fps)):
+        yield frame
+
+
+def with_panel(picture: Picture, simulation: Simulation, row: int = 0) -> Picture:
+    """Return a picture with the game's points, time and end written on it."""
+    image = Image.fromarray(picture)
+    draw = ImageDraw.Draw(image, "RGBA")
+    height = picture.shape[0]
+    font = ImageFont.load_default(size=max(height // 18, 10))
+    margin = height // 40
+    points, coins = simulation.state.points[row], simulation.table.coin_count[row]
+    text = f"{points} / {coins}    {simulation.time_s[row]:.1f} s"
+    if simulation.state.over[row]:
+        results = simulation.results(np.array([row]))
+        end = "finish" if results["success"][0] else "fall" if results["fall"][0] else "time up"
+        text += f"    {end}: {results['score_percent'][0]:.0f} %"
+    left, top, right, bottom = draw.textbbox((2 * margin, 2 * margin), text, font=font)
+    box = (left - margin, top - margin, right + margin, bottom + margin)
+    draw.rounded_rectangle(box, radius=margin, fill=(16, 24, 40, 150))
+    draw.text((2 * margin, 2 * margin), text, font=font, fill=(255, 255, 255, 255))
+    return np.asarray(image)

@@ -1,0 +1,25 @@
+"""Fixtures and settings that all tests share."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from hypothesis import settings
+
+from roller_env.drawing.opengl import missing_opengl
+
+# How long an example takes says nothing on a machine that runs other tests at the same time.
+settings.register_profile("roller", deadline=None)
+settings.load_profile("roller")
+
+
+@pytest.fixture(scope="session")
+def opengl() -> None:
+    """Skip what cannot be drawn on this machine; fail where ROLLER_REQUIRE_OPENGL=1 promises it."""
+    missing = missing_opengl()
+    if missing is None:
+        return
+    if os.environ.get("ROLLER_REQUIRE_OPENGL") == "1":
+        pytest.fail(missing)
+    pytest.skip(missing)

@@ -1,0 +1,221 @@
+"""What a step is worth."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from roller_env.game.rewards import (
+    RewardWeights,
+    follow_route,
+    points_reward,
+    route_progress,
+    shaping,
+)
+from roller_env.game.state import GameState
+from roller_env.game.tables import LevelTable
+from roller_env.level import Level
+from tests.builders import Game, coin, make_level, resting
+from tests.game.rails import Rails
+
+ROUTE = {
+    "points": [resting(), resting(10.0), resting(10.0, 10.0), resting(20.0, 10.0)],
+    "radius": 1.0,
+}
+WAY_M = 30.0
+
+
+def route_level(**pieces: object) -> Level:
+    return make_level(**{"route": ROUTE} | pieces)
+
+
+class Route:
+    """A ball on a route, and its potential: what the simulation does with it in every step."""
+
+    def __init__(self, level: Level | None = None):
+        self.table = LevelTable.of([level or route_level()]).for_rows(np.zeros(1, dtype=np.int64))
+        self.state = GameState.initial(self.table)
+
+    def potential(self, x: float, y: float) -> float:
+        ball = np.array([resting(x, y)])
+        follow_route(self.state, self.table, ball)
+        return float(route_progress(self.state, self.table, ball)[0])
+
+
+def shaping_sum(potentials: list[float], discount: float, ends: bool = False) -> float:
+    """Return the discounted sum of the shaping along a trajectory of potentials."""
+    total = 0.0
+    for step, (before, after) in enumerate(pairwise(potentials)):
+        over = np.array([ends and step == len(potentials) - 2])
+        reward = shaping(np.array([before]), np.array([after]), over, discount)
+        total += discount**step * float(reward[0])
+    return total
+
+
+# Points -------------------------------------------------------------------------------------------
+
+
+def test_a_coin_is_paid_once() -> None:
+    game = Game(make_level(coins=[coin(*resting(1.0))]))
+    rewards = [game.step("w").reward[0] for _ in range(30)]
+    rewards += [game.step("s").reward[0] for _ in range(60)]
+    assert sum(rewards) == 1.0
+    assert max(rewards) == 1.0
+
+
+def test_several_coins_in_one_step_are_all_paid() -> None:
+    rails = Rails(make_level(coins=[coin(*resting(0.1 * i)) for i in range(3)]))
+    events = rails.go(resting(0.1))
+    np.testing.assert_array_equal(points_reward(events, RewardWeights(coin=2.0)), [6.0])
+    again = rails.go(resting())
+    np.testing.assert_array_equal(points_reward(again, RewardWeights()), [0.0])
+
+
+def test_the_finish_and_the_fall_are_paid_by_their_weights() -> None:
+    weights = RewardWeights(finish=7.0, fall=-3.0)
+    rails = Rails(make_level(finish={"at": (3.0, 0.0, 0.5), "size": (1, 1, 1)}))
+    np.testing.assert_array_equal(points_reward(rails.go(resting(5.0)), weights), [7.0])
+    rails = Rails(make_level())
+    np.testing.assert_array_equal(points_reward(rails.go((0, 0, -40.0)), weights), [-3.0])
+
+
+def test_standing_still_is_worth_no_points() -> None:
+    game = Game(make_level())
+    assert sum(game.step().reward[0] for _ in range(20)) == 0.0
+
+
+@pytest.mark.parametrize("name", ["coin", "finish", "fall", "progress"])
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_a_weight_that_is_no_finite_number_is_refused(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=f"reward_weights.{name}"):
+        RewardWeights(**{name: value})
+
+
+# Progress -----------------------------------------------------------------------------------------
+
+
+def test_progress_is_the_share_of_the_route_that_lies_behind() -> None:
+    route = Route()
+    assert route.potential(0.0, 0.0) == 0.0
+    assert route.potential(5.0, 0.0) == pytest.approx(5.0 / WAY_M)
+    assert route.potential(10.0, 0.0) == pytest.approx(10.0 / WAY_M)
+    assert route.potential(10.0, 5.0) == pytest.approx(15.0 / WAY_M)
+    assert route.potential(10.0, 10.0) == pytest.approx(20.0 / WAY_M)
+    assert route.potential(20.0, 10.0) == pytest.approx(1.0)
+
+
+def test_progress_stays_between_0_and_1() -> None:
+    route = Route()
+    assert route.potential(-50.0, 30.0) == 0.0
+    assert route.potential(500.0, 500.0) == 0.0
+
+
+def test_a_leg_that_is_far_away_is_not_skipped_to() -> None:
+    """Reaching the finish's waypoint without the legs before it is no progress along the route."""
+    assert Route().potential(20.0, 10.0) < 0.5
+
+
+def test_a_level_without_a_route_has_no_progress() -> None:
+    route = Route(make_level())
+    assert route.potential(5.0, 0.0) == 0.0
+
+
+def test_a_shorter_routes_padding_is_never_followed() -> None:
+    short = make_level(route={"points": [resting(), resting(4.0)], "radius": 1.0})
+    table = LevelTable.of([short, route_level(), make_level()]).for_rows(np.array([0, 1, 2]))
+    state = GameState.initial(table)
+    for x in (1.0, 4.0, 4.0, 4.0, 4.0):
+        ball = np.tile(resting(x), (3, 1))
+        follow_route(state, table, ball)
+    progress = route_progress(state, table, ball)
+    np.testing.assert_allclose(progress, [1.0, 4.0 / WAY_M, 0.0])
+    assert state.waypoint.tolist() == [1, 1, 0]
+
+
+# Shaping ------------------------------------------------------------------------------------------
+
+walks = st.lists(
+    st.tuples(st.floats(-3.0, 23.0, allow_nan=False), st.floats(-3.0, 13.0, allow_nan=False)),
+    min_size=1,
+    max_size=30,
+)
+discounts = st.sampled_from([0.9, 0.99, 0.999, 1.0])
+
+
+@given(walks, discounts)
+def test_shaping_telescopes_to_minus_the_starts_potential_at_an_end(
+    walk: list[tuple[float, float]], discount: float
+) -> None:
+    """So it never changes which policy is best."""
+    route = Route()
+    potentials = [route.potential(x, y) for x, y in [(2.0, 0.0), *walk]]
+    total = shaping_sum(potentials, discount, ends=True)
+    assert total == pytest.approx(-potentials[0], abs=1e-12)
+
+
+@given(walks, discounts)
+def test_shaping_telescopes_to_the_last_potential_where_time_ran_out(
+    walk: list[tuple[float, float]], discount: float
+) -> None:
+    route = Route()
+    potentials = [route.potential(x, y) for x, y in [(2.0, 0.0), *walk]]
+    expected = discount ** (len(potentials) - 1) * potentials[-1] - potentials[0]
+    assert shaping_sum(potentials, discount) == pytest.approx(expected, abs=1e-12)
+
+
+@given(st.floats(0.0, 20.0), st.integers(1, 50), discounts)
+def test_hovering_pays_nothing_or_less(x: float, steps: int, discount: float) -> None:
+    potential = Route().potential(x, 0.0)
+    assert shaping_sum([potential] * (steps + 1), discount) <= 1e-12
+
+
+@given(walks, discounts)
+def test_circles_pay_nothing_net(walk: list[tuple[float, float]], discount: float) -> None:
+    """Whoever comes back to where the route stood no further has gained nothing."""
+    route = Route()
+    for x, y in [*walk, walk[0]]:
+        route.potential(x, y)
+    circle = [route.potential(x, y) for x, y in [*walk, walk[0]]]
+    if circle[0] == circle[-1]:
+        assert shaping_sum(circle, discount) <= 1e-12
+
+
+def test_going_on_pays_and_going_back_costs() -> None:
+    route = Route()
+    potentials = [route.potential(x, 0.0) for x in (2.0, 4.0, 3.0)]
+    assert shaping_sum(potentials[:2], 0.99) > 0.0
+    assert shaping_sum(potentials[1:], 0.99) < 0.0
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.sampled_from(["w", "a", "s", "d", "wa", ""]), min_size=5, max_size=40))
+def test_in_the_game_shaping_is_all_that_differs_from_points(keys: list[str]) -> None:
+    """And it telescopes there too, whatever is played."""
+    level = route_level(coins=[coin(*resting(1.5))])
+    discount, weight = 0.99, 10.0
+    shaped = Game(level, reward="shaped", discount=discount)
+    plain = Game(level)
+    first = Route(level).potential(0.0, 0.0)
+    total, route = 0.0, Route(level)
+    for step, held in enumerate(keys):
+        extra = shaped.step(held).reward[0] - plain.step(held).reward[0]
+        total += discount**step * extra
+        last = route.potential(*shaped.position[:2])
+    expected = weight * (discount ** len(keys) * last - first)
+    assert total == pytest.approx(expected, abs=1e-3)
+
+
+def test_the_fall_takes_the_potential_back() -> None:
+    """A terminal state is worth nothing, however far along the route it lies."""
+    island = {"at": (3.0, 0.0, -0.5), "size": (8.0, 4.0, 1.0)}
+    game = Game(route_level(boxes=[island]), reward="shaped", discount=1.0)
+    rewards = []
+    while not game.state.over[0]:
+        rewards.append(game.step("w").reward[0])
+        assert len(rewards) < 400, "the ball never fell"
+    assert game.state.fallen[0]
+    assert sum(rewards) == pytest.approx(-5.0, abs=1e-9)
