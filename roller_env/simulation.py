@@ -170,8 +170,12 @@ class Simulation:
             rows: (n,) row indices.
             intro: whether the keys work only after the intro's `rules.INTRO_S`, as when the game
                 is started; after a fall it goes on at once.
+
+        Raises:
+            ValueError: ``rows`` are not different row numbers.
         """
-        rows = np.arange(self.num_envs) if rows is None else np.asarray(rows, dtype=np.int64)
+        # In order, as the physics asks for them; every row has its own generator.
+        rows = np.arange(self.num_envs) if rows is None else np.sort(self._checked(rows))
         if len(rows) == 0:
             return
         table = self._levels.for_rows(self._level_of_row[rows])
@@ -330,7 +334,7 @@ class Simulation:
 
     def snapshot(self, rows: Int64 | None = None) -> Snapshot:
         """Return all that the future of ``rows`` (all, if None) depends on, as copies."""
-        rows = np.arange(self.num_envs) if rows is None else np.asarray(rows, dtype=np.int64)
+        rows = np.arange(self.num_envs) if rows is None else self._checked(rows)
         return Snapshot(
             level=self.compiled.level,
             physics=self._stepper.state[rows].copy(),
@@ -348,26 +352,32 @@ class Simulation:
             ValueError: the snapshot is of another level, or does not fit the rows.
         """
         count = len(snapshot.physics)
-        rows = np.arange(count) if rows is None else np.asarray(rows, dtype=np.int64)
-        places = np.unique(rows)
-        fits = len(rows) == count == len(places)
-        if not (fits and np.isin(places, np.arange(self.num_envs)).all()):
-            raise ValueError(
-                f"rows: found {rows.tolist()}; needed are {count} different ones from 0 to "
-                f"{self.num_envs - 1}"
-            )
+        rows = self._checked(np.arange(count) if rows is None else rows)
+        if len(rows) != count:
+            raise ValueError(f"rows: found {len(rows)} for a snapshot of {count}")
         if snapshot.level != self.compiled.level:
             raise ValueError(
                 f"snapshot: found one of level {snapshot.level.name!r}; this simulation plays "
                 f"{self.compiled.level.name!r}"
             )
-        self._stepper.reset(rows)
+        self._stepper.reset(np.sort(rows))
         self._stepper.state[rows] = snapshot.physics
         self.state.set_rows(rows, snapshot.game)
         self._level_of_row[rows] = snapshot.level_of_row
         for row, generator in zip(rows, snapshot.generators, strict=True):
             self._generators[row].bit_generator.state = generator
         self._measure_potential(rows)
+
+    def _checked(self, rows: Int64) -> Int64:
+        """Return ``rows`` as indices if they are different row numbers; a mask is not."""
+        rows = np.asarray(rows)
+        inside = np.isin(rows, np.arange(self.num_envs))
+        if rows.dtype == np.bool_ or not inside.all() or len(np.unique(rows)) != len(rows):
+            raise ValueError(
+                f"rows: found {rows.tolist()}; must be different row numbers from 0 to "
+                f"{self.num_envs - 1}"
+            )
+        return rows.astype(np.int64)
 
 
 def _report_divergence(compiled: CompiledLevel, state: Float64, ctrl: Float64) -> Path:

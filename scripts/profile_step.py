@@ -1,4 +1,4 @@
-"""Say where the time of a vector step goes: physics (mujoco.batch), rules, observation, the rest."""
+"""Say where the time of a vector step goes: physics (mujoco.batch), rules, observation."""
 
 from __future__ import annotations
 
@@ -48,9 +48,9 @@ def main() -> None:
     stats = pstats.Stats(profile).stats  # type: ignore[attr-defined]
 
     def seconds(file: str, function: str) -> float:
-        return sum(
-            entry[3] for key, entry in stats.items() if key[0].endswith(file) and key[2] == function
-        )
+        """Return the cumulative time of a function."""
+        wanted = (key for key in stats if key[0].endswith(file) and key[2] == function)
+        return float(sum(stats[key][3] for key in wanted))
 
     whole = seconds("envs/vector.py", "step")
     print(

@@ -106,8 +106,7 @@ def _strips(filled: npt.NDArray[np.bool_]) -> list[Rectangle]:
     running: dict[tuple[int, int], int] = {}
     for x in range(filled.shape[0] + 1):
         runs = _runs(filled[x]) if x < filled.shape[0] else []
-        for run in [run for run in running if run not in runs]:
-            done.append((running.pop(run), x, *run))
+        done += [(running.pop(run), x, *run) for run in list(running) if run not in runs]
         for run in runs:
             running.setdefault(run, x)
     return sorted(done)

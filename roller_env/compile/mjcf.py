@@ -167,9 +167,7 @@ def _add_mover(
         mass=mass,
         **_contact(level, preset, Material()),
     )
-    servo = spec.add_actuator(
-        name=piece.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=piece.name
-    )
+    servo = spec.add_actuator(name=piece.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=piece.name)
     # MuJoCo's intvelocity, spelt out: the shortcut would write an attribute that 3.x does not know.
     servo.dyntype = mujoco.mjtDyn.mjDYN_INTEGRATOR
     servo.gainprm[0] = kp

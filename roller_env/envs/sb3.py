@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import gymnasium as gym
@@ -16,7 +17,22 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvS
 
 from roller_env.envs.vector import RollerVectorEnv
 from roller_env.level import Level
-from roller_env.simulation import Simulation
+from roller_env.simulation import Simulation, Snapshot
+
+
+@dataclass(frozen=True, eq=False)
+class VecSnapshot:
+    """All that the future of a `RollerVecEnv` depends on.
+
+    Attributes:
+        games: of the simulation, every row.
+        returns: (N,) returns of the episodes under way.
+        lengths: (N,) their lengths, steps.
+    """
+
+    games: Snapshot
+    returns: npt.NDArray[np.float64]
+    lengths: npt.NDArray[np.int64]
 
 
 class RollerVecEnv(VecEnv):
@@ -134,6 +150,24 @@ class RollerVecEnv(VecEnv):
             infos[row] = info
         self._returns[rows] = 0.0
         self._lengths[rows] = 0
+
+    def snapshot(self) -> VecSnapshot:
+        """Return the state of all rows, also in the middle of episodes, as copies."""
+        return VecSnapshot(self.simulation.snapshot(), self._returns.copy(), self._lengths.copy())
+
+    def restore(self, snapshot: VecSnapshot) -> None:
+        """Put all rows back to a snapshot; the same actions then give the same bits.
+
+        Raises:
+            ValueError: the snapshot is of another level or number of rows.
+        """
+        if len(snapshot.returns) != self.num_envs:
+            raise ValueError(
+                f"snapshot: found {len(snapshot.returns)} rows; this has {self.num_envs}"
+            )
+        self.simulation.restore(snapshot.games)
+        self._returns = snapshot.returns.copy()
+        self._lengths = snapshot.lengths.copy()
 
     def close(self) -> None:
         """Free what the environment holds."""

@@ -62,11 +62,13 @@ def forces(mode: ActionMode, actions: npt.ArrayLike) -> Float64:
             raise ValueError(
                 f"actions: found {array.min()} to {array.max()}; 'directions' takes 0 to 8"
             )
-        return KEY_FORCE_N * (_DIRECTION_KEYS[array] @ KEY_AXES)
+        direction: Float64 = KEY_FORCE_N * (_DIRECTION_KEYS[array] @ KEY_AXES)
+        return direction
     if mode == "keys":
         if array.ndim != 2 or array.shape[1] != len(KEYS):
             raise ValueError(f"actions: found shape {array.shape}; 'keys' takes (N, 4)")
-        return KEY_FORCE_N * ((array != 0) @ KEY_AXES)
+        pushed: Float64 = KEY_FORCE_N * ((array != 0) @ KEY_AXES)
+        return pushed
     if array.ndim != 2 or array.shape[1] != 2:
         raise ValueError(f"actions: found shape {array.shape}; 'force' takes (N, 2)")
     if not np.isfinite(array).all():

@@ -1,7 +1,7 @@
 """What an agent is shown, entry by entry.
 
-`STATE_ENTRIES` is the one list from which the vector's layout, the Gymnasium spaces and the README's
-table are made.
+`STATE_ENTRIES` is the one list from which the layout, the Gymnasium spaces and the README's table
+are made.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ STATE_ENTRIES: Final = (
         "m",
         "ball",
         *_FREE,
-        f"x, y, z of the {NEAREST_COINS} nearest coins left, nearest first; 0 where there are fewer",
+        f"x, y, z of the {NEAREST_COINS} nearest coins left, nearest first; else 0",
     ),
     Entry("coins_present", NEAREST_COINS, "-", "-", 0.0, 1.0, "1 where `coins` shows a coin"),
     Entry("plate", 3, "m", "ball", *_FREE, "centre of the nearest plate not yet struck; 0 if none"),
@@ -171,8 +171,8 @@ def state_observation(
     _show_coins(out, ball.position, state, table)
     unstruck = table.exists(Kind.PLATE) & ~state.plate_struck
     _show_nearest(out, "plate", ball.position, table.centres(Kind.PLATE), unstruck)
-    out[:, _LAYOUT["plate_sinking"]] = (
-        (state.plate_struck & ~state.plate_down).any(axis=1, keepdims=True)
+    out[:, _LAYOUT["plate_sinking"]] = (state.plate_struck & ~state.plate_down).any(
+        axis=1, keepdims=True
     )
     _show_gate(out, ball, table)
     pads = table.exists(Kind.LIFT_PAD)
@@ -218,7 +218,7 @@ def _show_nearest(
         return np.zeros(len(ball), dtype=np.int64)
     relative = centres - ball[:, None, :]
     distance = np.where(candidates, np.einsum("nki,nki->nk", relative, relative), np.inf)
-    nearest = distance.argmin(axis=1)
+    nearest: npt.NDArray[np.int64] = distance.argmin(axis=1)
     rows = np.arange(len(ball))
     present = candidates[rows, nearest]
     out[:, _LAYOUT[name]] = np.where(present[:, None], relative[rows, nearest], 0.0)
@@ -277,3 +277,18 @@ def ray_observation(level_rays: Float64, scan: Float64, ball_radius: Float64) ->
 def split(observation: Float32, parts: Sequence[Entry]) -> dict[str, Float32]:
     """Return the observation's entries, (..., size), by name."""
     return {name: observation[..., where] for name, where in layout(parts).items()}
+
+
+def markdown_table(parts: Iterable[Entry]) -> str:
+    """Return the entries as the table that the README shows."""
+    lines = ["| index | name | meaning | unit | frame | range |", "|---|---|---|---|---|---|"]
+    parts = tuple(parts)
+    for entry, where in zip(parts, layout(parts).values(), strict=True):
+        first, last = where.start, where.stop - 1
+        index = f"{first}" if first == last else f"{first} to {last}"
+        low, high = f"{entry.low:g}", f"{entry.high:g}"
+        lines.append(
+            f"| {index} | `{entry.name}` | {entry.meaning} | {entry.unit} | {entry.frame} "
+            f"| {low} to {high} |"
+        )
+    return "\n".join(lines)

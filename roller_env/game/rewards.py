@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import Literal
 
 import numpy as np
@@ -29,24 +31,25 @@ class RewardWeights:
 
     coin: float = 1.0
     finish: float = 10.0
-    fall: float = -5.0
-    progress: float = 10.0
+    fall: float = -1.0
+    progress: float = 20.0
 
     def __post_init__(self) -> None:
         """Refuse weights that are not finite numbers."""
         for name in self.__slots__:
             value = getattr(self, name)
-            if not np.isfinite(value):
-                raise ValueError(f"reward_weights.{name}: found {value}; must be a finite number")
+            if not (isinstance(value, Real) and math.isfinite(value)):
+                raise ValueError(f"reward_weights.{name}: found {value!r}; must be a finite number")
 
 
 def points_reward(events: Events, weights: RewardWeights) -> Float64:
     """Return the points, (N,), of a step's events: coins, finish, fall."""
-    return (
+    points: Float64 = (
         weights.coin * events.coins.sum(axis=1)
         + weights.finish * events.finished
         + weights.fall * events.fallen
     )
+    return points
 
 
 def follow_route(state: GameState, table: LevelTable, ball: Float64) -> None:

@@ -95,7 +95,7 @@ class _Regions:
 
 
 def _first_crossing(path: Float64, depth: Float64, regions: _Regions) -> Float64:
-    """Return the first time, (pairs,) in substeps, at which each path goes from outside to inside."""
+    """Return the time, (pairs,) in substeps, at which each path first goes from out to inside."""
     before, after = depth[:, :-1], depth[:, 1:]
     enters = (before > 0.0) & (after <= 0.0)
     length = np.linalg.norm(np.diff(path, axis=1), axis=-1)

@@ -120,7 +120,9 @@ class LevelTable:
         low, high = region[..., :3] - reach, region[..., :3] + reach
 
         gates = max(len(level.gates) for level in levels)
-        routes = [np.array(level.route.points) if level.route else np.zeros((0, 3)) for level in levels]
+        routes = [
+            np.array(level.route.points) if level.route else np.zeros((0, 3)) for level in levels
+        ]
         return LevelTable(
             slices=slices,
             region_centre=region[..., :3],
@@ -158,7 +160,6 @@ class LevelTable:
         Where there is one level only, the rows are views of the same memory.
         """
 
-
         def choose(array: Any) -> Any:
             if isinstance(array, tuple):
                 return tuple(choose(part) for part in array)
@@ -171,7 +172,7 @@ class LevelTable:
 
     def width(self, kind: Kind) -> int:
         """Return the padded number of regions of ``kind``."""
-        return self.slices[kind].stop - self.slices[kind].start
+        return int(self.slices[kind].stop - self.slices[kind].start)
 
     def centres(self, kind: Kind) -> Float64:
         """Return the centres, (L, n, 3), of the regions of ``kind``."""

@@ -10,16 +10,6 @@ from mujoco.batch import Batch
 Float64 = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.int64]
 
-_BAD_STATE = [
-    int(warning)
-    for warning in (
-        mujoco.mjtWarning.mjWARN_BADQPOS,
-        mujoco.mjtWarning.mjWARN_BADQVEL,
-        mujoco.mjtWarning.mjWARN_BADQACC,
-        mujoco.mjtWarning.mjWARN_BADCTRL,
-    )
-]
-
 
 class Stepper:
     """N copies of one model's state, bit-identical to a plain ``mj_step`` loop at any thread count.
@@ -72,8 +62,11 @@ class Stepper:
         return path
 
     def diverged(self) -> npt.NDArray[np.bool_]:
-        """Say which worlds, (N,), MuJoCo has given up on since their last `reset`."""
-        bad: npt.NDArray[np.bool_] = (self._batch.warning[:, _BAD_STATE, 1] > 0).any(axis=1)
+        """Say which worlds, (N,), MuJoCo has given up on since their last `reset`.
+
+        A world of which MuJoCo warned, of whatever, no longer moves.
+        """
+        bad: npt.NDArray[np.bool_] = (self._batch.warning[:, :, 1] > 0).any(axis=1)
         return bad
 
     def reset(self, rows: Rows) -> None:

@@ -25,9 +25,9 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
-from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.training.config import TrainingConfig
 from roller_env.training.files import write_atomically
+from roller_env.training.practice import PracticeStarts
 
 _HEADER: Final = b"roller-checkpoint-1 sha256 "
 """Starts the file; the number is the format's, raised when an old file can no longer be read."""
@@ -75,7 +75,7 @@ class Checkpoint:
     progress: Progress
     members: dict[str, bytes]
 
-    def restore(self, environments: RollerVecEnv) -> PPO:
+    def restore(self, environments: PracticeStarts) -> PPO:
         """Return the learner as it was, and set environments and random generators back too.
 
         Args:
@@ -107,7 +107,7 @@ def save_checkpoint(file: Path, model: PPO, config: TrainingConfig, progress: Pr
     normaliser = model.get_vec_normalize_env()
     assert normaliser is not None
     environments = normaliser.venv
-    assert isinstance(environments, RollerVecEnv)
+    assert isinstance(environments, PracticeStarts)
     stream = io.BytesIO()
     model.save(stream)
     members = {

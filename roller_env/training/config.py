@@ -75,6 +75,8 @@ class TrainingConfig(_Frozen):
         algorithm: how it learns.
         seed: of the environments, the network's initial weights and the order of the samples.
         num_envs: environments that are stepped together.
+        practice_share: of the episodes that begin at a waypoint of the route that the agent has
+            reached before, not at the level's start; see `roller_env.training.practice`.
         total_steps: environment steps, over all environments, after which training ends.
         wall_clock_budget_s: training ends after this time at the latest; None for no limit.
             A run that ends by time is not repeatable bit for bit on another machine.
@@ -93,6 +95,7 @@ class TrainingConfig(_Frozen):
     algorithm: Literal["ppo"] = "ppo"
     seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
     num_envs: PositiveInt = 256
+    practice_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     total_steps: PositiveInt = 4_000_000
     wall_clock_budget_s: PositiveFloat | None = None
     checkpoint_interval_s: NonNegativeFloat = 30.0

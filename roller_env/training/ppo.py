@@ -21,6 +21,7 @@ from roller_env.training.config import TrainingConfig
 from roller_env.training.display import ProgressDisplay
 from roller_env.training.files import RunFiles
 from roller_env.training.logs import STEPS, ContinuingCSV, ContinuingTensorBoard
+from roller_env.training.practice import FROM_START, PracticeStarts
 
 _ACTIVATIONS: Final[dict[str, type[torch.nn.Module]]] = {
     "tanh": torch.nn.Tanh,
@@ -78,14 +79,15 @@ def is_complete(config: TrainingConfig, progress: Progress) -> bool:
     return progress.steps >= config.total_steps or out_of_time
 
 
-def make_environments(config: TrainingConfig) -> RollerVecEnv:
+def make_environments(config: TrainingConfig) -> PracticeStarts:
     """Return the environments that a configuration trains in."""
-    return RollerVecEnv(
+    environments = RollerVecEnv(
         config.level, config.num_envs, seed=config.seed, **config.environment_options
     )
+    return PracticeStarts(environments, config.practice_share, config.seed)
 
 
-def new_model(config: TrainingConfig, environments: RollerVecEnv) -> PPO:
+def new_model(config: TrainingConfig, environments: PracticeStarts) -> PPO:
     """Return a learner that knows nothing yet."""
     normaliser = VecNormalize(
         environments,
@@ -125,7 +127,7 @@ class _BudgetSpent(Exception):
 
 @dataclass(slots=True)
 class _Episodes:
-    """The episodes that ended during one rollout."""
+    """The whole episodes, from the level's start, that ended during one rollout."""
 
     infos: list[dict[str, Any]] = field(default_factory=list)
 
@@ -161,8 +163,8 @@ class _Recorder(BaseCallback):
         self._episodes = _Episodes()
 
     def _on_step(self) -> bool:
-        infos = self.locals["infos"]
-        self._episodes.infos += [infos[row] for row in np.flatnonzero(self.locals["dones"])]
+        ended = (self.locals["infos"][row] for row in np.flatnonzero(self.locals["dones"]))
+        self._episodes.infos += [info for info in ended if info[FROM_START]]
         return True
 
     def _on_rollout_start(self) -> None:

@@ -196,7 +196,7 @@ def test_going_on_pays_and_going_back_costs() -> None:
 def test_in_the_game_shaping_is_all_that_differs_from_points(keys: list[str]) -> None:
     """And it telescopes there too, whatever is played."""
     level = route_level(coins=[coin(*resting(1.5))])
-    discount, weight = 0.99, 10.0
+    discount, weight = 0.99, RewardWeights().progress
     shaped = Game(level, reward="shaped", discount=discount)
     plain = Game(level)
     first = Route(level).potential(0.0, 0.0)
@@ -218,4 +218,4 @@ def test_the_fall_takes_the_potential_back() -> None:
         rewards.append(game.step("w").reward[0])
         assert len(rewards) < 400, "the ball never fell"
     assert game.state.fallen[0]
-    assert sum(rewards) == pytest.approx(-5.0, abs=1e-9)
+    assert sum(rewards) == pytest.approx(RewardWeights().fall, abs=1e-9)

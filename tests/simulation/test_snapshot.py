@@ -118,6 +118,28 @@ def test_a_snapshot_of_another_level_is_refused_before_anything_changes() -> Non
     assert bits(bridge) == before
 
 
+def test_rows_may_be_named_in_any_order() -> None:
+    simulation, other = simulation_of("bridge", num_envs=3), simulation_of("bridge", num_envs=3)
+    first, second, _ = bits(simulation)
+    simulation.restore(simulation.snapshot(np.array([0, 1])), np.array([2, 0]))
+    assert bits(simulation) == [second, second, first]
+    other.restore(simulation.snapshot())
+    simulation.reset(np.array([2, 0]))
+    other.reset(np.array([0, 2]))
+    assert bits(simulation) == bits(other)
+
+
+@pytest.mark.parametrize("rows", [[0, 0], [3], [-1], [True, False, True], [0.5]])
+def test_what_are_no_different_rows_is_refused_before_anything_changes(rows: list[Any]) -> None:
+    simulation = simulation_of("bridge", num_envs=3)
+    before = bits(simulation)
+    with pytest.raises(ValueError, match=r"rows: found .* from 0 to 2"):
+        simulation.reset(np.array(rows))
+    with pytest.raises(ValueError, match=r"rows: found .* from 0 to 2"):
+        simulation.snapshot(np.array(rows))
+    assert bits(simulation) == before
+
+
 @pytest.mark.parametrize("rows", [[0], [0, 1, 2], [0, 0], [0, 3], [-1, 0]])
 def test_a_snapshot_is_refused_for_rows_that_do_not_fit_it(rows: list[int]) -> None:
     simulation = simulation_of("flat", num_envs=3)

@@ -14,7 +14,6 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 
-from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.simulation import Snapshot
 from roller_env.training.checkpoint import (
     Checkpoint,
@@ -24,6 +23,7 @@ from roller_env.training.checkpoint import (
 )
 from roller_env.training.files import RunError, RunFiles, only_one_process, write_atomically
 from roller_env.training.ppo import learn, make_environments
+from roller_env.training.practice import PracticeStarts
 from tests.training.small import UPDATES, small_config
 
 
@@ -47,8 +47,8 @@ def normaliser(model: PPO) -> VecNormalize:
 
 def games(model: PPO) -> Snapshot:
     environments = normaliser(model).venv
-    assert isinstance(environments, RollerVecEnv)
-    return environments.simulation.snapshot()
+    assert isinstance(environments, PracticeStarts)
+    return environments.environments.simulation.snapshot()
 
 
 def test_weights_and_optimizer_come_back_bit_for_bit(
