@@ -36,7 +36,7 @@ $(READY): pyproject.toml constraints.txt
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
 		--constraint constraints.txt hatchling editables
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
-		--constraint constraints.txt --no-build-isolation --editable '.[train,dev]'
+		--constraint constraints.txt --no-build-isolation --editable '.[train,lab,dev]'
 	@touch $(READY)
 	@echo "$(VENV) is ready."
 

@@ -1,0 +1,352 @@
+"""Forces and torques on rigid bodies, and the derivative that an integrator follows.
+
+A **load** is a function ``(state, t) -> Wrench``: it may depend on the state and on the time.
+`total` adds loads, `derivative_of` makes of a load what the integrators take. What a player
+holds (keys, a lift) changes by jumps, which no method of high order can follow inside a step:
+it is a function of time alone, sampled at the beginning of a step and held through it (`held`),
+just as MuJoCo holds ``ctrl`` and ``xfrc_applied``.
+
+SI units, world frame, torques about the centre of mass.
+
+Two formulae of the report are damaged in print; the ones here are mended. It has the torque of a
+force F at p as F x (p - x), whose sign is wrong: the torque is **(p - x) x F**. And it has the
+velocity at p as v + omega * (p - x), a product of two vectors which lost its cross:
+**v + omega x (p - x)**.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.rigid_body import quaternion
+from roller_env.rigid_body.arrays import (
+    Float64,
+    cross,
+    dot,
+    fitting_column,
+    fitting_rows,
+    non_negative,
+    numbers,
+    read_only,
+    rows,
+)
+from roller_env.rigid_body.state import State
+
+SWITCH_SLACK_S: Final = 1e-9
+"""A switch this close after a step's beginning belongs to the step: 3 * 0.1 is not 0.3."""
+
+GAME_KEYS: Final[Mapping[str, tuple[float, float, float]]] = {
+    "W": (1.0, 0.0, 0.0),
+    "S": (-1.0, 0.0, 0.0),
+    "A": (0.0, 1.0, 0.0),
+    "D": (0.0, -1.0, 0.0),
+}
+"""Directions of the original's keys in the game's axes (x forward, y left, z up)."""
+
+KEY_FORCE_N: Final = 200.0 * 0.0254
+"""Force of one key: 200 kg quant/s^2 (``phent_addcentralforce``), a quant being an inch."""
+
+
+class Wrench(NamedTuple):
+    """A force and a torque on each of N bodies.
+
+    Attributes:
+        force: (N, 3) N, world frame, acting at the centre of mass.
+        torque: (N, 3) N m, world frame, about the centre of mass.
+    """
+
+    force: Float64
+    torque: Float64
+
+
+Load = Callable[[State, float], Wrench]
+"""What acts on the bodies in a state at a time, s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Derivative:
+    """The report's Derivatives: rates of change of the four primary values.
+
+    Orientation has its rate twice: ``spin`` for methods that add quaternions, ``angular_velocity``
+    for those that turn by a rotation vector.
+    """
+
+    state: State
+    wrench: Wrench
+
+    @property
+    def velocity(self) -> Float64:
+        """Rate of the position, (N, 3) m/s."""
+        return self.state.velocity
+
+    @property
+    def spin(self) -> Float64:
+        """Rate of the orientation as a quaternion, (N, 4) 1/s."""
+        return self.state.spin
+
+    @property
+    def angular_velocity(self) -> Float64:
+        """Rate of the orientation as a vector, (N, 3) rad/s, world frame."""
+        return self.state.angular_velocity
+
+    @property
+    def force(self) -> Float64:
+        """Rate of the momentum, (N, 3) N."""
+        return self.wrench.force
+
+    @property
+    def torque(self) -> Float64:
+        """Rate of the angular momentum, (N, 3) N m."""
+        return self.wrench.torque
+
+
+DerivativeFunction = Callable[[State, float], Derivative]
+"""Rates of change in a state at a time, s."""
+
+
+def derivative_of(load: Load) -> DerivativeFunction:
+    """Return the derivative under ``load``.
+
+    Raises:
+        ValueError: from the returned function, when the load gives another shape than (N, 3).
+    """
+
+    def derivative(state: State, t: float) -> Derivative:
+        wrench = load(state, t)
+        for name, value in zip(Wrench._fields, wrench, strict=True):
+            if np.shape(value) != (state.count, 3):
+                raise ValueError(
+                    f"the load's {name} must have shape ({state.count}, 3), got {np.shape(value)}"
+                )
+        return Derivative(state, wrench)
+
+    return derivative
+
+
+def none(state: State, t: float) -> Wrench:
+    """Return no force and no torque: the load of a free body."""
+    zero = np.zeros((state.count, 3))
+    return Wrench(zero, zero)
+
+
+def total(*loads: Load) -> Load:
+    """Return the load that is the sum of ``loads``; of none, no load."""
+
+    def load(state: State, t: float) -> Wrench:
+        wrench = none(state, t)
+        for one in loads:
+            added = one(state, t)
+            wrench = Wrench(wrench.force + added.force, wrench.torque + added.torque)
+        return wrench
+
+    return load if loads else none
+
+
+def constant(
+    force: npt.ArrayLike = (0.0, 0.0, 0.0), torque: npt.ArrayLike = (0.0, 0.0, 0.0)
+) -> Load:
+    """Return a force, N, and a torque, N m, that never change; each (3,) or (N, 3)."""
+    force_n, torque_nm = numbers("force", force), numbers("torque", torque)
+
+    def load(state: State, _t: float) -> Wrench:
+        still = np.zeros((state.count, 3))
+        return Wrench(
+            still + fitting_rows("force", force_n, state.count, 3),
+            still + fitting_rows("torque", torque_nm, state.count, 3),
+        )
+
+    return load
+
+
+def gravity(acceleration: npt.ArrayLike) -> Load:
+    """Return the weight in a uniform field, m/s^2, (3,) or (N, 3). It has no torque.
+
+    The report's up is y and the game's is z, so there is no default.
+    """
+    field = numbers("acceleration", acceleration)
+
+    def load(state: State, _t: float) -> Wrench:
+        weight = state.body.mass[:, None] * fitting_rows("acceleration", field, state.count, 3)
+        return Wrench(weight, np.zeros_like(weight))
+
+    return load
+
+
+def linear_drag(coefficient: npt.ArrayLike) -> Load:
+    """Return the force -c v, with c in N s/m, one number or (N,), not negative."""
+    c = non_negative("coefficient", coefficient)
+
+    def load(state: State, _t: float) -> Wrench:
+        force = -fitting_column("coefficient", c, state.count) * state.velocity
+        return Wrench(force, np.zeros_like(force))
+
+    return load
+
+
+def driving_torque(torque: npt.ArrayLike = (1.0, 0.0, 0.0), damping: npt.ArrayLike = 0.1) -> Load:
+    """Return the report's torque, (1, 0, 0) - 0.1 omega unless told otherwise.
+
+    Driving and damping balance at omega = torque / damping (10 rad/s about x), which a cube nears
+    with the time constant inertia / damping (10 I seconds).
+
+    Args:
+        torque: N m, (3,) or (N, 3), world frame.
+        damping: N m s, one number or (N,), not negative.
+    """
+    drive, c = numbers("torque", torque), non_negative("damping", damping)
+
+    def load(state: State, _t: float) -> Wrench:
+        resisting = fitting_column("damping", c, state.count) * state.angular_velocity
+        moment = fitting_rows("torque", drive, state.count, 3) - resisting
+        return Wrench(np.zeros_like(moment), moment)
+
+    return load
+
+
+def force_at(state: State, force: npt.ArrayLike, point: npt.ArrayLike) -> Wrench:
+    """Return what a force at a point of the body does: **all** of it pushes, and it turns as well.
+
+    Args:
+        state: N bodies.
+        force: F, (3,) or (N, 3) N, world frame.
+        point: p, (3,) or (N, 3) m, world frame.
+
+    Returns:
+        Force F and torque (p - x) x F, x being the centre of mass.
+
+    Raises:
+        ValueError: on a wrong shape or NaN.
+    """
+    push = rows("force", force, state.count, 3)
+    return Wrench(push, cross(rows("point", point, state.count, 3) - state.position, push))
+
+
+def push_at(force: npt.ArrayLike, body_point: npt.ArrayLike, *, in_body: bool = False) -> Load:
+    """Return a steady push at a point fixed to the body.
+
+    Args:
+        force: (3,) or (N, 3) N.
+        body_point: (3,) or (N, 3) m, body coordinates.
+        in_body: whether the force turns with the body, as a thruster's does. Otherwise it keeps
+            its direction in the world.
+    """
+    push, point = numbers("force", force), numbers("body_point", body_point)
+
+    def load(state: State, _t: float) -> Wrench:
+        still = np.zeros((state.count, 3))
+        acting = still + fitting_rows("force", push, state.count, 3)
+        if in_body:
+            acting = quaternion.rotate(state.rotation, acting)
+        at = fitting_rows("body_point", point, state.count, 3)
+        return Wrench(acting, cross(quaternion.rotate(state.rotation, at), acting))
+
+    return load
+
+
+def on_axle(load: Load, axis: npt.ArrayLike) -> Load:
+    """Return ``load`` as it acts on bodies held by a smooth axle through the centre of mass.
+
+    The axle takes up the whole force and every torque but that about itself: a wheel held by its
+    axle only turns. True for bodies that turn about a principal axis along the axle (otherwise
+    the axle would also have to hold against the body's own wobble).
+
+    Args:
+        load: what acts on the free body.
+        axis: (3,) or (N, 3), world frame, any length but 0.
+
+    Raises:
+        ValueError: on an axis of length 0 or of a wrong shape.
+    """
+    direction = numbers("axis", axis)
+    length = np.sqrt(dot(direction, direction))
+    if (length == 0.0).any():
+        raise ValueError("axis must not be the zero vector: it has no direction")
+    unit = direction / length[..., None]
+
+    def held_load(state: State, t: float) -> Wrench:
+        along = fitting_rows("axis", unit, state.count, 3)
+        wrench = load(state, t)
+        return Wrench(np.zeros_like(wrench.force), dot(wrench.torque, along)[:, None] * along)
+
+    return held_load
+
+
+def velocity_at(state: State, point: npt.ArrayLike) -> Float64:
+    """Return the velocity of the body's matter at a point: v + omega x (p - x), (N, 3) m/s.
+
+    Args:
+        state: N bodies.
+        point: p, (3,) or (N, 3) m, world frame.
+
+    Raises:
+        ValueError: on a wrong shape or NaN.
+    """
+    arm = rows("point", point, state.count, 3) - state.position
+    return state.velocity + cross(state.angular_velocity, arm)
+
+
+@dataclass(frozen=True, eq=False)
+class PiecewiseConstantForce:
+    """A force on the centres of mass that changes by jumps: what a keyboard gives.
+
+    Attributes:
+        switches_s: (K,) rising times at which a new force begins, s. Before the first, no force.
+        forces: (K, 3) N, the same for all bodies, or (K, N, 3).
+    """
+
+    switches_s: Float64
+    forces: Float64
+
+    def __post_init__(self) -> None:
+        times, forces = numbers("switches_s", self.switches_s), numbers("forces", self.forces)
+        if times.ndim != 1 or len(times) == 0 or (np.diff(times) <= 0.0).any():
+            raise ValueError(f"switches_s must be one or more rising times, got {times.tolist()}")
+        if forces.ndim not in {2, 3} or forces.shape[0] != len(times) or forces.shape[-1] != 3:
+            raise ValueError(
+                f"forces must have shape ({len(times)}, 3) or ({len(times)}, N, 3) for "
+                f"{len(times)} switches, got {forces.shape}"
+            )
+        object.__setattr__(self, "switches_s", read_only(times))
+        object.__setattr__(self, "forces", read_only(forces))
+
+    def force_at_time(self, t: float) -> Float64:
+        """Return the force at t, (3,) or (N, 3) N; at a switch, the new one."""
+        index = int(np.searchsorted(self.switches_s, t + SWITCH_SLACK_S, side="right")) - 1
+        return self.forces[index] if index >= 0 else np.zeros_like(self.forces[0])
+
+    def held(self, t: float) -> Load:
+        """Return the force at t as a load that keeps it whatever the time."""
+        return constant(force=self.force_at_time(t))
+
+
+def key_sequence(
+    events: Sequence[tuple[float, str]],
+    *,
+    key_force_n: float = KEY_FORCE_N,
+    keys: Mapping[str, tuple[float, float, float]] = GAME_KEYS,
+) -> PiecewiseConstantForce:
+    """Return the force of held keys over time; keys add, so two of them push on the diagonal.
+
+    Args:
+        events: (time in s, keys held from then on), such as
+            ``[(0.0, "W"), (1.0, "WA"), (2.5, "")]``; times rise.
+        key_force_n: force of one key, N.
+        keys: direction of each key.
+
+    Raises:
+        ValueError: an unknown key, or times that do not rise.
+    """
+    unknown = sorted({key for _, held in events for key in held} - set(keys))
+    if unknown:
+        raise ValueError(f"unknown keys {unknown}: the keys are {sorted(keys)}")
+    pushes = [
+        np.sum([keys[key] for key in set(held)] or [(0.0, 0.0, 0.0)], axis=0) for _, held in events
+    ]
+    return PiecewiseConstantForce(
+        np.array([time for time, _ in events]), key_force_n * np.array(pushes)
+    )
