@@ -24,15 +24,16 @@ class RewardWeights:
 
     Attributes:
         coin: for each coin collected.
-        finish: for reaching the finish.
+        finish: for reaching the finish. By default twice the progress: at the finish the shaping
+            takes the potential back, and that step should still be worth taking.
         fall: for falling below the kill height.
         progress: potential of a completed route, for the ``shaped`` reward only.
     """
 
     coin: float = 1.0
-    finish: float = 10.0
+    finish: float = 20.0
     fall: float = -1.0
-    progress: float = 20.0
+    progress: float = 10.0
 
     def __post_init__(self) -> None:
         """Refuse weights that are not finite numbers."""
