@@ -54,23 +54,25 @@ def points_reward(events: Events, weights: RewardWeights) -> Float64:
 
 
 def follow_route(state: GameState, table: LevelTable, ball: Float64) -> None:
-    """Advance each row's next waypoint past the legs that the ball, (N, 3), has reached.
+    """Advance each row's next waypoint past the furthest leg that the ball, (N, 3), has reached.
 
-    A waypoint is passed when the ball is within the route's radius of the leg that follows it.
+    A leg is reached when the ball is within the route's radius of it. Legs that the ball has
+    jumped over count as passed: a waypoint missed in flight must not draw it back.
     """
     width = table.route.shape[1]
     if width < 2:
         return
-    rows = np.arange(len(ball))
-    here = np.minimum(state.waypoint, width - 1)
-    after = np.minimum(state.waypoint + 1, width - 1)
-    start, end = table.route[rows, here], table.route[rows, after]
+    start, end = table.route[:, :-1], table.route[:, 1:]
     along = end - start
-    length2 = (along * along).sum(axis=1)
-    share = ((ball - start) * along).sum(axis=1) / np.maximum(length2, 1e-12)
-    nearest = start + np.clip(share, 0.0, 1.0)[:, None] * along
-    reached = ((ball - nearest) ** 2).sum(axis=1) <= table.route_radius**2
-    state.waypoint += reached & (state.waypoint + 1 < table.route_length)
+    length2 = np.maximum((along * along).sum(axis=2), 1e-12)
+    share = ((ball[:, None] - start) * along).sum(axis=2) / length2
+    nearest = start + np.clip(share, 0.0, 1.0)[..., None] * along
+    distance2 = ((ball[:, None] - nearest) ** 2).sum(axis=2)
+    leg = np.arange(width - 1)
+    real = leg + 1 < table.route_length[:, None]
+    reached = real & (distance2 <= table.route_radius[:, None] ** 2)
+    furthest = np.where(reached, leg + 1, 0).max(axis=1)
+    state.waypoint = np.maximum(state.waypoint, furthest)
 
 
 def route_progress(state: GameState, table: LevelTable, ball: Float64) -> Float64:

@@ -52,12 +52,10 @@ class Progress:
 
     Attributes:
         steps: environment steps, over all environments.
-        updates: rollouts learnt from.
         wall_s: seconds spent training, over all sessions.
     """
 
     steps: int = 0
-    updates: int = 0
     wall_s: float = 0.0
 
 

@@ -114,9 +114,23 @@ def test_progress_stays_between_0_and_1() -> None:
     assert route.potential(500.0, 500.0) == 0.0
 
 
-def test_a_leg_that_is_far_away_is_not_skipped_to() -> None:
-    """Reaching the finish's waypoint without the legs before it is no progress along the route."""
-    assert Route().potential(20.0, 10.0) < 0.5
+def test_a_waypoint_that_was_missed_does_not_draw_the_ball_back() -> None:
+    """A ball thrown over a leg goes on from the leg where it comes down."""
+    route = Route()
+    assert route.potential(10.5, 8.0) == pytest.approx((20.0 - np.hypot(0.5, 2.0)) / WAY_M)
+        (20.0 - np.hypot(0.5, 1.0)) / WAY_M, abs=1e-9
+    )
+    before = route.potential(12.0, 10.0)
+    assert before == pytest.approx(22.0 / WAY_M)
+    assert route.potential(16.0, 10.0) > before
+
+
+def test_a_leg_out_of_reach_is_not_skipped_to() -> None:
+    route = Route()
+    route.potential(15.0, 8.5)
+    assert route.state.waypoint[0] == 0
+    route.potential(15.0, 9.5)
+    assert route.state.waypoint[0] == 3
 
 
 def test_a_level_without_a_route_has_no_progress() -> None:
