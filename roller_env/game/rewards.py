@@ -59,19 +59,18 @@ def follow_route(state: GameState, table: LevelTable, ball: Float64) -> None:
     A leg is reached when the ball is within the route's radius of it. Legs that the ball has
     jumped over count as passed: a waypoint missed in flight must not draw it back.
     """
-    width = table.route.shape[1]
-    if width < 2:
+    x, y, z = (
+        position[:, None] - start for position, start in zip(ball.T, table.leg_start, strict=True)
+    )
+    if x.shape[1] == 0:
         return
-    start, end = table.route[:, :-1], table.route[:, 1:]
-    along = end - start
-    length2 = np.maximum((along * along).sum(axis=2), 1e-12)
-    share = ((ball[:, None] - start) * along).sum(axis=2) / length2
-    nearest = start + np.clip(share, 0.0, 1.0)[..., None] * along
-    distance2 = ((ball[:, None] - nearest) ** 2).sum(axis=2)
-    leg = np.arange(width - 1)
-    real = leg + 1 < table.route_length[:, None]
-    reached = real & (distance2 <= table.route_radius[:, None] ** 2)
-    furthest = np.where(reached, leg + 1, 0).max(axis=1)
+    way_x, way_y, way_z = table.leg_way
+    length2 = way_x * way_x + way_y * way_y + way_z * way_z
+    share = (x * way_x + y * way_y + z * way_z) / np.maximum(length2, 1e-12)
+    np.clip(share, 0.0, 1.0, out=share)
+    distance2 = (x - share * way_x) ** 2 + (y - share * way_y) ** 2 + (z - share * way_z) ** 2
+    reached = distance2 <= table.route_radius[:, None] ** 2
+    furthest = np.where(reached, np.arange(1, x.shape[1] + 1), 0).max(axis=1)
     state.waypoint = np.maximum(state.waypoint, furthest)
 
 

@@ -1,9 +1,9 @@
 """When does a moving ball enter a region? Decided on the whole path, so nothing is jumped over.
 
-A region is a rounded box: all points within a radius of a box, and higher than a floor. It is
-convex, so along a straight piece of path the distance to it is a convex function of time: it is
-entered at most once a piece, and a piece that starts and ends outside crosses it only if the
-minimum between is inside.
+A region is a rounded box: all points within a radius of a box, and higher than a floor. Along a
+straight piece of path the squared distance to the box is a convex and piecewise quadratic function
+of time, whose pieces meet where the path crosses the planes of the box's faces. So the time of
+entry is the root of one quadratic, and nothing has to be searched for.
 """
 
 from __future__ import annotations
@@ -16,12 +16,6 @@ from roller_env.game.tables import LevelTable
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
-
-_HALVINGS = 40
-"""Bisections of one substep: 2^-40 of it is below a nanometre at any speed of the game."""
-
-_TRISECTIONS = 60
-"""Ternary searches of one substep: (2/3)^60 = 3e-11 of it."""
 
 
 def find_entries(
@@ -100,47 +94,96 @@ def _first_crossing(path: Float64, depth: Float64, regions: _Regions) -> Float64
     enters = (before > 0.0) & (after <= 0.0)
     length = np.linalg.norm(np.diff(path, axis=1), axis=-1)
     may_graze = (before > 0.0) & (after > 0.0) & (before + after <= length)
-    inside_at = np.ones_like(before)
-    pairs, pieces = np.nonzero(may_graze)
-    if len(pairs):
-        deepest, bottom = _deepest(path[pairs, pieces], path[pairs, pieces + 1], regions, pairs)
-        inside_at[pairs, pieces] = deepest
-        enters[pairs, pieces] = bottom <= 0.0
     times = np.full(len(depth), np.inf)
-    pairs = np.flatnonzero(enters.any(axis=1))
+    pairs, pieces = np.nonzero(enters | may_graze)
     if len(pairs):
-        piece = enters[pairs].argmax(axis=1)
-        start, end = path[pairs, piece], path[pairs, piece + 1]
-        times[pairs] = piece + _boundary(start, end, inside_at[pairs, piece], regions, pairs)
+        share = _crossing(path[pairs, pieces], path[pairs, pieces + 1], regions, pairs)
+        # A piece that ends inside by less than rounding enters at its end.
+        share = np.where(enters[pairs, pieces], np.minimum(share, 1.0), share)
+        np.minimum.at(times, pairs, pieces + share)
     return times
 
 
-def _deepest(
-    start: Float64, end: Float64, regions: _Regions, pairs: Int64
-) -> tuple[Float64, Float64]:
-    """Return the fraction of each piece at which it is deepest, and the depth there; both (n,)."""
-    low, high = np.zeros(len(start)), np.ones(len(start))
-    for _ in range(_TRISECTIONS):
-        left, right = low + (high - low) / 3.0, high - (high - low) / 3.0
-        is_left = regions.depth(_between(start, end, left), pairs) < regions.depth(
-            _between(start, end, right), pairs
-        )
-        low, high = np.where(is_left, low, left), np.where(is_left, right, high)
-    middle = (low + high) / 2.0
-    return middle, regions.depth(_between(start, end, middle), pairs)
+def _crossing(start: Float64, end: Float64, regions: _Regions, pairs: Int64) -> Float64:
+    """Return the share, (n,) in 0 to 1, at which straight pieces enter; ``inf`` for a miss.
+
+    Args:
+        start: (n, 3) metres, outside the region.
+        end: (n, 3) metres.
+        regions: of all pairs.
+        pairs: (n,) the pair of each piece.
+    """
+    way = end - start
+    box = _BoxDistance(start - regions.centre[pairs], way, regions.half[pairs])
+    height = start[:, 2] - regions.centre[pairs, 2] - regions.floor[pairs]
+    reach2 = regions.radius[pairs] ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rises = np.where((height < 0.0) & (way[:, 2] > 0.0), -height / way[:, 2], np.inf)
+    over_floor = np.where(height >= 0.0, 0.0, rises)
+    near = box.entry(reach2)
+    share = np.maximum(near, over_floor)
+    # Both sets are convex, so the later of the two entries is in both, or nothing is.
+    at = np.minimum(share, 1.0)
+    holds = (near >= over_floor) | (box.squared(at[:, None])[:, 0] <= reach2)
+    holds &= (over_floor >= near) | (height + at * way[:, 2] >= 0.0)
+    return np.where(holds & (share <= 1.0), share, np.inf)
 
 
-def _boundary(
-    start: Float64, end: Float64, inside_at: Float64, regions: _Regions, pairs: Int64
-) -> Float64:
-    """Return the fraction, (n,), at which each piece, outside at 0, first is inside."""
-    low, high = np.zeros(len(start)), inside_at
-    for _ in range(_HALVINGS):
-        middle = (low + high) / 2.0
-        is_inside = regions.depth(_between(start, end, middle), pairs) <= 0.0
-        low, high = np.where(is_inside, low, middle), np.where(is_inside, middle, high)
-    return high
+class _BoxDistance:
+    """The squared distance to a box along straight pieces, as functions of the share 0 to 1."""
 
+    def __init__(self, start: Float64, way: Float64, half: Float64):
+        """Take (n, 3) starts relative to the boxes' centres, ways and half edges, all metres."""
+        self._start, self._way, self._half = start, way, half
+        with np.errstate(divide="ignore", invalid="ignore"):
+            planes = np.concatenate([(half - start) / way, (-half - start) / way], axis=1)
+        # Along an axis on which nothing moves no plane is crossed.
+        planes = np.clip(np.where(np.isfinite(planes), planes, 0.0), 0.0, 1.0)
+        ends = np.tile([0.0, 1.0], (len(start), 1))
+        self._nodes = np.sort(np.concatenate([ends, planes], axis=1), axis=1)
 
-def _between(start: Float64, end: Float64, fraction: Float64) -> Float64:
-    return start + (end - start) * fraction[:, None]
+    def _beyond(self, share: Float64) -> Float64:
+        """Return the vectors, (n, k, 3), from the nearest point of the box at (n, k) shares."""
+        at = self._start[:, None] + self._way[:, None] * share[..., None]
+        half = self._half[:, None]
+        return at - np.clip(at, -half, half)
+
+    def squared(self, share: Float64) -> Float64:
+        """Return the squared distance, (n, k), at (n, k) shares."""
+        beyond = self._beyond(share)
+        return np.einsum("nki,nki->nk", beyond, beyond)
+
+    def _half_slope(self, share: Float64) -> Float64:
+        """Return half the derivative, (n, k): continuous, never falling, linear between nodes."""
+        return np.einsum("nki,ni->nk", self._beyond(share), self._way)
+
+    def nearest(self) -> Float64:
+        """Return the share, (n,), at which each piece is nearest to its box."""
+        slope = self._half_slope(self._nodes)
+        rows = np.arange(len(slope))
+        rising = slope >= 0.0
+        after = np.where(rising.any(axis=1), rising.argmax(axis=1), slope.shape[1] - 1)
+        before = np.maximum(after - 1, 0)
+        low, high = slope[rows, before], slope[rows, after]
+        left, right = self._nodes[rows, before], self._nodes[rows, after]
+        crosses = (low < 0.0) & (high > 0.0)
+        part = np.where(crosses, -low / np.where(crosses, high - low, 1.0), 1.0)
+        return left + (right - left) * part
+
+    def entry(self, reach2: Float64) -> Float64:
+        """Return the share, (n,), at which the squared distance falls to ``reach2``, or ``inf``."""
+        nodes = np.minimum(self._nodes, self.nearest()[:, None])
+        within = self.squared(nodes) <= reach2[:, None]
+        rows, after = np.arange(len(nodes)), within.argmax(axis=1)
+        left = nodes[rows, np.maximum(after - 1, 0)]
+        right = nodes[rows, after]
+        excess = self.squared(left[:, None])[:, 0] - reach2
+        slopes = self._half_slope(np.stack([left, right], axis=1))
+        width = np.where(right > left, right - left, 1.0)
+        curvature = (slopes[:, 1] - slopes[:, 0]) / width
+        # excess + 2 slope s + curvature s^2 = 0, the smaller root, without cancellation.
+        fall = -slopes[:, 0]
+        root = np.sqrt(np.maximum(fall * fall - curvature * excess, 0.0))
+        step = excess / np.maximum(fall + root, np.finfo(np.float64).tiny)
+        share = np.where(after == 0, 0.0, np.minimum(left + step, right))
+        return np.where(within.any(axis=1), share, np.inf)

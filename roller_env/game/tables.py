@@ -84,6 +84,8 @@ class LevelTable:
     trigger_kind: Int64  # (L, T)
     route: Float64  # (L, W, 3)
     route_arc: Float64  # (L, W) metres along the route up to each waypoint
+    leg_start: tuple[Float64, Float64, Float64]  # from waypoint to waypoint: x, y, z, (L, W - 1)
+    leg_way: tuple[Float64, Float64, Float64]  # to the next waypoint, each (L, W - 1)
     route_radius: Float64  # (L,)
     route_length: Int64  # (L,) number of waypoints, 0 for none
 
@@ -150,6 +152,8 @@ class LevelTable:
             ).astype(np.int64),
             route=pad(lambda level: level.route.points if level.route else [], (3,)),
             route_arc=_padded_arcs(routes),
+            leg_start=_planes(_padded_legs([route[:-1] for route in routes], FAR_M)),
+            leg_way=_planes(_padded_legs([np.diff(route, axis=0) for route in routes], 0.0)),
             route_radius=np.array([level.route.radius if level.route else 0.0 for level in levels]),
             route_length=np.array([len(route) for route in routes]),
         )
@@ -217,6 +221,14 @@ def _opens(level: Level, gates: int) -> list[list[float]]:
     names = [gate.name for gate in level.gates]
     padding = [0.0] * (gates - len(names))
     return [[float(name in plate.opens) for name in names] + padding for plate in level.plates]
+
+
+def _padded_legs(legs: Sequence[Float64], padding: float) -> Float64:
+    """Return (L, W - 1, 3): the legs of each route, and ``padding`` behind its end."""
+    padded = np.full((len(legs), max(len(leg) for leg in legs), 3), padding)
+    for row, leg in zip(padded, legs, strict=True):
+        row[: len(leg)] = leg
+    return padded
 
 
 def _padded_arcs(routes: Sequence[Float64]) -> Float64:

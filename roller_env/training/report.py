@@ -119,7 +119,8 @@ def draw_learning_curve(config: TrainingConfig, coins_in_level: int, files: RunF
             if whole is not None:
                 axis.set_ylim(-0.03, 1.03)
                 axis.yaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{share:.0%}"))
-        axes[0].legend(loc="lower right", frameon=False)
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper right", ncols=2, frameon=False)
         figure.suptitle(
             f"{config.algorithm.upper()} on {config.level}, seed {config.seed}: "
             f"{steps[-1] if rows else 0:,.0f} steps in {wall_s / 60:.1f} min, "
