@@ -100,6 +100,7 @@ class Simulation:
         self._stepper = Stepper(self.compiled.model, num_envs, config.substeps, config.num_threads)
         self._generators = [np.random.default_rng() for _ in range(num_envs)]
         self._potential = np.zeros(num_envs)
+        self._max_steps = self._episode_lengths()
         self._ray_directions = observations.ray_directions()
         self._scan_offsets = observations.scan_offsets()
         ball, velocity = self.compiled.ball_qpos, self.compiled.ball_qvel
@@ -124,13 +125,6 @@ class Simulation:
     def qpos(self) -> Float64:
         """(N, nq) copy of MuJoCo's positions, for drawing."""
         return self._stepper.qpos.copy()
-
-    @property
-    def max_steps(self) -> Int64:
-        """(N,) control steps after which an episode is truncated."""
-        steps = np.ceil(self.table.time_limit_s / self.duration_s - 1e-9).astype(np.int64)
-        limit = self.config.max_episode_steps
-        return steps if limit is None else np.minimum(steps, limit)
 
     @property
     def time_s(self) -> Float64:
@@ -236,7 +230,7 @@ class Simulation:
         events = rules.find_events(state, table, motion)
         reward = rewards.points_reward(events, self.config.reward_weights)
         rules.apply(state, table, motion, events)
-        state.truncated = ~state.terminated & (state.steps >= self.max_steps[every])
+        state.truncated = ~state.terminated & (state.steps >= self._max_steps[every])
         if self.config.reward == "shaped":
             reward += self._shaping(every, state, table, motion.ball[:, -1])
         return reward
@@ -315,9 +309,7 @@ class Simulation:
             spin=self._spin[every],
             gate=self._stepper.qpos[every][:, self.compiled.gate_qpos],
         )
-        vector = observations.state_observation(
-            ball, state, table, self.max_steps[every].astype(np.float64)
-        )
+        vector = observations.state_observation(ball, state, table, self._max_steps[every])
         if self.config.observation != "rays":
             return vector
         return np.concatenate([vector, self._cast_rays(rows, ball.position, table)], axis=1)
@@ -329,6 +321,12 @@ class Simulation:
         down = np.broadcast_to([0.0, 0.0, -1.0], self._scan_offsets.shape)
         scan = self._stepper.rays(ball[:, None, :] + self._scan_offsets, down, body, rows)
         return observations.ray_observation(level_rays, scan, table.ball_radius)
+
+    def _episode_lengths(self) -> Int64:
+        """Return the control steps, (N,), after which an episode is truncated."""
+        steps = np.ceil(self.table.time_limit_s / self.duration_s - 1e-9).astype(np.int64)
+        limit = self.config.max_episode_steps
+        return steps if limit is None else np.minimum(steps, limit)
 
     # What is kept ----------------------------------------------------------------------------
 

@@ -28,7 +28,9 @@ DIRECTIONS: Final = ("", "w", "wa", "a", "as", "s", "sd", "d", "wd")
 """Keys held in each of the nine discrete actions: none, then round the compass from forward to
 the left."""
 
-_DIRECTION_KEYS: Final = np.array([[key in held for key in KEYS] for held in DIRECTIONS])
+_DIRECTION_FORCES_N: Final = KEY_FORCE_N * (
+    np.array([[key in held for key in KEYS] for held in DIRECTIONS]) @ KEY_AXES
+)
 
 
 def held_keys(held: str) -> npt.NDArray[np.int8]:
@@ -62,7 +64,7 @@ def forces(mode: ActionMode, actions: npt.ArrayLike) -> Float64:
             raise ValueError(
                 f"actions: found {array.min()} to {array.max()}; 'directions' takes 0 to 8"
             )
-        direction: Float64 = KEY_FORCE_N * (_DIRECTION_KEYS[array] @ KEY_AXES)
+        direction: Float64 = _DIRECTION_FORCES_N[array]
         return direction
     if mode == "keys":
         if array.ndim != 2 or array.shape[1] != len(KEYS):

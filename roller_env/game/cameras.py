@@ -71,6 +71,8 @@ def retreat(mode: Int64, ball: Float64, camera_x: Float64, duration_s: float) ->
     Changes ``mode`` and ``camera_x``, both (N,), in place.
     """
     retreating = mode == MODE_RETREAT
+    if not retreating.any():
+        return
     camera_x[retreating] -= RETREAT_SPEED_M_S * duration_s
     mode[retreating & (camera_x <= ball[:, 0] + OFFSETS_M[MODE_BEHIND, 0])] = MODE_BEHIND
 

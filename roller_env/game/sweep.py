@@ -50,12 +50,9 @@ def find_entries(
 
 def _near(path: Float64, table: LevelTable) -> Bool:
     """Say which regions' bounding boxes, (n, M), meet the bounding box of the row's path."""
-    low, high = path.min(axis=1), path.max(axis=1)
-    near = np.ones(table.region_radius.shape, dtype=bool)
-    for axis in range(3):
-        near &= table.region_low[axis] <= high[:, axis, None]
-        near &= table.region_high[axis] >= low[:, axis, None]
-    return near
+    low, high = path.min(axis=1)[..., None], path.max(axis=1)[..., None]
+    meets: Bool = (table.region_low <= high) & (table.region_high >= low)
+    return meets[:, 0] & meets[:, 1] & meets[:, 2]
 
 
 class _Regions:
@@ -146,16 +143,19 @@ class _BoxDistance:
         """Return the vectors, (n, k, 3), from the nearest point of the box at (n, k) shares."""
         at = self._start[:, None] + self._way[:, None] * share[..., None]
         half = self._half[:, None]
-        return at - np.clip(at, -half, half)
+        beyond: Float64 = at - np.clip(at, -half, half)
+        return beyond
 
     def squared(self, share: Float64) -> Float64:
         """Return the squared distance, (n, k), at (n, k) shares."""
         beyond = self._beyond(share)
-        return np.einsum("nki,nki->nk", beyond, beyond)
+        squared: Float64 = np.einsum("nki,nki->nk", beyond, beyond)
+        return squared
 
     def _half_slope(self, share: Float64) -> Float64:
         """Return half the derivative, (n, k): continuous, never falling, linear between nodes."""
-        return np.einsum("nki,ni->nk", self._beyond(share), self._way)
+        slope: Float64 = np.einsum("nki,ni->nk", self._beyond(share), self._way)
+        return slope
 
     def nearest(self) -> Float64:
         """Return the share, (n,), at which each piece is nearest to its box."""
@@ -168,7 +168,8 @@ class _BoxDistance:
         left, right = self._nodes[rows, before], self._nodes[rows, after]
         crosses = (low < 0.0) & (high > 0.0)
         part = np.where(crosses, -low / np.where(crosses, high - low, 1.0), 1.0)
-        return left + (right - left) * part
+        share: Float64 = left + (right - left) * part
+        return share
 
     def entry(self, reach2: Float64) -> Float64:
         """Return the share, (n,), at which the squared distance falls to ``reach2``, or ``inf``."""

@@ -65,14 +65,16 @@ class LevelTable:
     region_half: Float64  # (L, M, 3)
     region_radius: Float64  # (L, M)
     region_floor: Float64  # (L, M)
-    region_low: tuple[Float64, Float64, Float64]  # bounding boxes: x, y and z apart, each (L, M)
-    region_high: tuple[Float64, Float64, Float64]
+    region_low: Float64  # (L, 3, M) bounding boxes' corners
+    region_high: Float64  # (L, 3, M)
+    region_real: Bool  # (L, M) no padding
     ball_radius: Float64  # (L,)
     kill_height: Float64  # (L,)
     time_limit_s: Float64  # (L,)
     start: Float64  # (L, 3)
     jitter: Float64  # (L, 2)
     coin_count: Int64  # (L,)
+    coin_planes: tuple[Float64, Float64, Float64]  # x, y and z of the coins apart, each (L, K)
     plate_stop: Float64  # (L, P) displacement at which a plate is down, <= 0
     plate_speed: Float64  # (L, P)
     plate_opens: Bool  # (L, P, G)
@@ -131,14 +133,16 @@ class LevelTable:
             region_half=region[..., 3:6],
             region_radius=region[..., 6],
             region_floor=region[..., 7],
-            region_low=_planes(low),
-            region_high=_planes(high),
+            region_low=np.ascontiguousarray(low.transpose(0, 2, 1)),
+            region_high=np.ascontiguousarray(high.transpose(0, 2, 1)),
+            region_real=region[..., 0] < FAR_M,
             ball_radius=np.array([level.ball.radius for level in levels]),
             kill_height=np.array([level.kill_height for level in levels]),
             time_limit_s=np.array([level.time_limit_s for level in levels]),
             start=np.array([level.start.at for level in levels]),
             jitter=np.array([level.start.jitter for level in levels]),
             coin_count=np.array([len(part[Kind.COIN]) for part in parts]),
+            coin_planes=_planes(region[:, slices[Kind.COIN], :3]),
             plate_stop=pad(lambda level: [p.sinks_to - p.at[2] for p in level.plates]),
             plate_speed=pad(lambda level: [p.speed for p in level.plates]),
             plate_opens=pad(lambda level: _opens(level, gates), (gates,)) > 0.0,
@@ -184,8 +188,7 @@ class LevelTable:
 
     def exists(self, kind: Kind) -> Bool:
         """Say which of the regions of ``kind``, (L, n), are not padding."""
-        real: Bool = self.region_centre[:, self.slices[kind], 0] < FAR_M
-        return real
+        return self.region_real[:, self.slices[kind]]
 
 
 def _regions(level: Level) -> dict[Kind, Float64]:
@@ -212,7 +215,7 @@ def _regions(level: Level) -> dict[Kind, Float64]:
 
 
 def _planes(array: Float64) -> tuple[Float64, Float64, Float64]:
-    """Return x, y and z of (L, M, 3) as contiguous arrays, for comparisons over all regions."""
+    """Return x, y and z of (L, n, 3) as contiguous arrays, for sums over all n."""
     x, y, z = (np.ascontiguousarray(array[..., axis]) for axis in range(3))
     return x, y, z
 
