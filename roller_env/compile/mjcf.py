@@ -33,6 +33,11 @@ SERVO_FREQUENCY: Final = 200.0
 """Natural frequency of the plates' and gates' servos, rad/s. They trail their set-point by
 2 speed / frequency (8 mm for a gate) and implicitfast is stable up to dt = 4.8 / frequency."""
 
+MIDPHASE_GEOMS: Final = 150
+"""Geoms up to which the ball is tested against every bounding box in turn. MuJoCo's tree of boxes
+(the midphase) finds the same contacts, to the bit; measured, it costs 0.3 to 0.5 us of a step of 6
+on 62 geoms and saves 2.4 of 9 on 600."""
+
 SCRIPT_RATE_HZ: Final = 60.0
 """Nominal rate of the original's script loops."""
 
@@ -51,6 +56,8 @@ def build_spec(level: Level, preset: PhysicsPreset) -> mujoco.MjSpec:
         _add_mover(spec, level, preset, plate, plate.sinks_to, 0.0)
     for gate in level.gates:
         _add_mover(spec, level, preset, gate, gate.lowers_to, gate.yaw_deg)
+    if len(spec.geoms) <= MIDPHASE_GEOMS:
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     return spec
 
 
