@@ -98,11 +98,14 @@ def controls(
     Timers that end within the step act for their share of it, so that no impulse depends on the
     length of the control step.
     """
-    held = np.clip(1.0 - state.control_delay_s / duration_s, 0.0, 1.0)
-    thrust = np.minimum(state.thrust_s / duration_s, 1.0) * table.pad_force_n
-    force = np.empty((len(key_force_n), 3))
-    force[:, :2] = key_force_n * held[:, None]
-    force[:, 2] = thrust.sum(axis=1)
+    force = np.zeros((len(key_force_n), 3))
+    force[:, :2] = key_force_n
+    if state.control_delay_s.any():
+        held = np.clip(1.0 - state.control_delay_s / duration_s, 0.0, 1.0)
+        force[:, :2] *= held[:, None]
+    if state.thrust_s.any():
+        thrust = np.minimum(state.thrust_s / duration_s, 1.0) * table.pad_force_n
+        force[:, 2] = thrust.sum(axis=1)
     return Controls(
         force_n=force,
         plate_velocity=np.where(state.plate_struck, -table.plate_speed, 0.0),
@@ -116,9 +119,12 @@ def find_events(state: GameState, table: LevelTable, motion: Motion) -> Events:
     finish = entry[:, table.slices[Kind.FINISH]].min(axis=1)
     fall = _time_of_fall(motion.ball, table.kill_height)
     end = np.minimum(finish, fall)
-    # What lies behind the end of the game did not happen.
-    entry[entry > end[:, None]] = np.inf
-    met = np.isfinite(entry)
+    met = entry < np.inf
+    ends = end < np.inf
+    if ends.any():
+        # What lies behind the end of the game did not happen.
+        met &= entry <= end[:, None]
+        entry[~met] = np.inf
     return Events(
         entry=entry,
         inside=inside,
@@ -126,7 +132,7 @@ def find_events(state: GameState, table: LevelTable, motion: Motion) -> Events:
         plates=met[:, table.slices[Kind.PLATE]],
         pads=met[:, table.slices[Kind.LIFT_PAD]],
         triggers=met[:, table.slices[Kind.TRIGGER]],
-        finished=np.isfinite(finish) & (finish <= fall),
+        finished=ends & (finish <= fall),
         fallen=fall < finish,
         end=end,
     )
@@ -145,9 +151,9 @@ def _time_of_fall(ball: Float64, kill_height: Float64) -> Float64:
     """Return the substep time, (N,), at which the ball first is at or below the kill height."""
     below = ball[:, :, 2] <= kill_height[:, None]
     time = np.full(len(ball), np.inf)
-    rows = np.flatnonzero(below.any(axis=1))
-    if len(rows) == 0:
+    if not below.any():
         return time
+    rows = np.flatnonzero(below.any(axis=1))
     after = below[rows].argmax(axis=1)
     before = np.maximum(after - 1, 0)
     high, low = ball[rows, before, 2], ball[rows, after, 2]
@@ -160,7 +166,8 @@ def _time_of_fall(ball: Float64, kill_height: Float64) -> Float64:
 def apply(state: GameState, table: LevelTable, motion: Motion, events: Events) -> None:
     """Change ``state`` by a step's events and by the passing of its time."""
     state.steps += 1
-    state.control_delay_s = np.maximum(state.control_delay_s - motion.duration_s, 0.0)
+    if state.control_delay_s.any():
+        state.control_delay_s = np.maximum(state.control_delay_s - motion.duration_s, 0.0)
     state.coin_taken |= events.coins
     state.touching = events.inside
     _move_slabs(state, table, motion, events)
@@ -182,6 +189,8 @@ def _fire_pads(state: GameState, table: LevelTable, motion: Motion, events: Even
 
     A pad that is still pushing does not fire again, so that its push never lasts longer.
     """
+    if not (events.pads.any() or state.thrust_s.any()):
+        return
     fires = events.pads & (state.thrust_s <= 0.0)
     remaining = np.maximum(state.thrust_s - motion.duration_s, 0.0)
     # Sums of control steps miss a timer's end by rounding: what is left then is no time at all.
@@ -205,7 +214,8 @@ def _move_camera(state: GameState, table: LevelTable, motion: Motion, events: Ev
     if events.triggers.any() or first_person.any():
         _fire_triggers(state, table, ball, events, first_person)
     # The original sets mode 0 in every frame of the push.
-    state.camera_mode[(state.thrust_s > 0.0).any(axis=1)] = cameras.MODE_BEHIND
+    if state.thrust_s.any():
+        state.camera_mode[(state.thrust_s > 0.0).any(axis=1)] = cameras.MODE_BEHIND
 
 
 def _fire_triggers(
