@@ -1,0 +1,153 @@
+"""The interface between a scene, which knows an answer, and what measures methods on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal, Protocol, runtime_checkable
+
+from roller_env.lab.methods import Method, without_warnings
+from roller_env.lab.timing import WallTime, wall_time
+
+ErrorKind = Literal["discretisation", "model"]
+ERROR_KINDS: Final[tuple[ErrorKind, ...]] = ("discretisation", "model")
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """One error that a scene measures.
+
+    Attributes:
+        name: its key in `Trial.errors`.
+        label: what an axis or a column says, with the unit: ``position error after 10 s, m``.
+        kind: against the same model with a vanishing step, or against the rigid closed form.
+    """
+
+    name: str
+    label: str
+    kind: ErrorKind
+
+
+class Trial(Protocol):
+    """One simulation of a scene with one method and one time step; can be run again."""
+
+    def run(self) -> None:
+        """Simulate from the start to the scene's horizon. This is what is timed."""
+        ...
+
+    def errors(self) -> Mapping[str, float]:
+        """Return the errors of the last run by the name of their `Measure`.
+
+        Not finite, or absurdly large, where the method failed.
+        """
+        ...
+
+
+@runtime_checkable
+class SteadyTrial(Trial, Protocol):
+    """A trial whose steps all cost the same, so that timing a few of them tells the whole's price.
+
+    Without this a long run of a slow method would have to be repeated in full for its median.
+    """
+
+    @property
+    def part_s(self) -> float:
+        """Simulated time of the part, seconds."""
+        ...
+
+    def run_part(self) -> None:
+        """Simulate the part, from the start. This is what is timed, and `run` is not."""
+        ...
+
+
+class Scene(Protocol):
+    """A motion with a known answer."""
+
+    @property
+    def name(self) -> str:
+        """Its key on the command line and in files."""
+        ...
+
+    @property
+    def title(self) -> str:
+        """What a chart's panel is called, for somebody who has never heard of it."""
+        ...
+
+    @property
+    def horizon_s(self) -> float:
+        """Simulated time, seconds."""
+        ...
+
+    @property
+    def measures(self) -> Sequence[Measure]:
+        """Its errors; the first is the one that the chart shows."""
+        ...
+
+    @property
+    def methods(self) -> Sequence[Method]:
+        """The methods that can simulate it."""
+        ...
+
+    @property
+    def time_steps_s(self) -> Sequence[float]:
+        """Time steps of a full run, largest first: {1, 2, 5} x 10^k."""
+        ...
+
+    @property
+    def failure(self) -> float:
+        """Value of the first measure above which the method counts as failed."""
+        ...
+
+    def trial(self, method: Method, dt_s: float) -> Trial:
+        """Return a simulation of the scene, ready to run."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One row of the results: one measure of one method with one time step on one scene."""
+
+    scene: str
+    method: str
+    measure: str
+    kind: ErrorKind
+    dt_s: float
+    error: float
+    failed: bool
+    wall_s_per_s: float
+    """Median wall seconds for a simulated second."""
+    wall_spread: float
+    evaluations_per_s: float
+    """Evaluations of the forces for a simulated second."""
+
+
+def measure(scene: Scene, method: Method, dt_s: float, repeats: int) -> list[Point]:
+    """Run one method with one time step, and return a point for each of the scene's measures."""
+    trial = scene.trial(method, dt_s)
+    with without_warnings():
+        wall, timed_s = _timed(trial, scene.horizon_s, repeats)
+    errors = trial.errors()
+    failed = not errors[scene.measures[0].name] < scene.failure
+    return [
+        Point(
+            scene=scene.name,
+            method=method.name,
+            measure=one.name,
+            kind=one.kind,
+            dt_s=dt_s,
+            error=errors[one.name],
+            failed=failed,
+            wall_s_per_s=wall.median_s / timed_s,
+            wall_spread=wall.spread,
+            evaluations_per_s=method.evaluations / dt_s,
+        )
+        for one in scene.measures
+    ]
+
+
+def _timed(trial: Trial, horizon_s: float, repeats: int) -> tuple[WallTime, float]:
+    """Run a trial, time it, and return how long it took and the simulated seconds of that."""
+    if isinstance(trial, SteadyTrial):
+        trial.run()
+        return wall_time(trial.run_part, repeats), trial.part_s
+    return wall_time(trial.run, repeats), horizon_s

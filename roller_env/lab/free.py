@@ -1,0 +1,503 @@
+"""Free motions with a known answer: no contact, so that an error is the integrator's alone.
+
+The rigid closed form is what every method here approaches as the time step vanishes, MuJoCo's as
+well as ours: in free flight the models are the same, and all errors are discretisation errors.
+
+An error is the largest over ten equally spaced moments, not the last one, which an oscillating
+error may happen to cross. It is relative to the largest value that the true motion reaches, but for
+the attitude's, which is an angle.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from roller_env.lab.experiment import Measure
+from roller_env.lab.methods import (
+    FREE,
+    MUJOCO,
+    Method,
+    MujocoMethod,
+    RigidBodyMethod,
+    without_warnings,
+)
+from roller_env.rigid_body import (
+    Body,
+    Load,
+    State,
+    advance,
+    constant,
+    driving_torque,
+    exact,
+    gravity,
+    linear_drag,
+    quaternion,
+    total,
+)
+from roller_env.rigid_body.arrays import Float64, dot
+
+MOMENTS: Final = 10
+"""Moments of a run at which the error is taken; the first is horizon / 10, the last its end."""
+
+FAILURE: Final = 1.0
+"""An error as large as the motion itself (or a radian): nothing is left of the answer."""
+
+_RIGID_BODY_PART_STEPS: Final = 20
+_MUJOCO_PART_STEPS: Final = 1000
+"""Steps that are timed: some milliseconds, against which starting the clock is nothing."""
+
+Vector = tuple[float, float, float]
+Truth = Callable[[State, Float64], State]
+"""Gives N bodies at time 0, and a time for each (N,) in s, the bodies at those times."""
+
+_STILL: Final[Vector] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Acting:
+    """What acts on the body: the same numbers for our integrators and for MuJoCo. World frame."""
+
+    gravity_m_s2: Vector = _STILL
+    force_n: Vector = _STILL
+    torque_nm: Vector = _STILL
+    drag_n_s_m: float = 0.0
+    """c of the force -c v."""
+    spin_damping_nm_s: float = 0.0
+    """c of the torque -c omega."""
+
+    def load(self) -> Load:
+        """Return it for our integrators; what is zero costs nothing."""
+        loads: list[Load] = []
+        if any(self.gravity_m_s2):
+            loads.append(gravity(self.gravity_m_s2))
+        if any(self.force_n):
+            loads.append(constant(force=self.force_n))
+        if self.drag_n_s_m:
+            loads.append(linear_drag(self.drag_n_s_m))
+        if any(self.torque_nm) or self.spin_damping_nm_s:
+            loads.append(driving_torque(self.torque_nm, self.spin_damping_nm_s))
+        return loads[0] if len(loads) == 1 else total(*loads)
+
+    def apply(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        """Let it act on the only body of a compiled model.
+
+        The damping goes into the joint. As a force in ``xfrc_applied`` MuJoCo would hold it through
+        the stages of a Runge-Kutta step, which would then be of first order.
+        """
+        model.opt.gravity[:] = self.gravity_m_s2
+        model.dof_damping[:3] = self.drag_n_s_m
+        model.dof_damping[3:] = self.spin_damping_nm_s
+        data.xfrc_applied[1, :3] = self.force_n
+        data.xfrc_applied[1, 3:] = self.torque_nm
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Something whose error is measured."""
+
+    name: str
+    label: str
+    """What a chart's axis says; ``{horizon}`` stands for the seconds simulated."""
+    of: Callable[[FreeScene, State], Float64]
+    """Its value in the rows of a state, (K,) or (K, n); for `attitude` the quaternion."""
+    is_angle: bool = False
+
+    def error(self, scene: FreeScene, measured: State) -> float:
+        """Return the largest error over the rows, relative unless it is an angle."""
+        value, truth = self.of(scene, measured), self.of(scene, scene.truth)
+        if self.is_angle:
+            return float(quaternion.angle_between(value, truth).max())
+        scale = max(_sizes(truth).max(), _sizes(self.of(scene, scene.start)).max())
+        return float(_sizes(value - truth).max() / scale)
+
+
+def _sizes(values: Float64) -> Float64:
+    """Return the lengths of vectors, or the magnitudes of numbers, (K,)."""
+    return np.abs(values) if values.ndim == 1 else quaternion.norm(values)
+
+
+def _energy(scene: FreeScene, state: State) -> Float64:
+    weight = state.body.mass[:, None] * np.array(scene.acting.gravity_m_s2)
+    return state.kinetic_energy() - dot(weight, state.position)
+
+
+def _growth(scene: FreeScene, state: State) -> Float64:
+    """Return the rate at which a wobble about the axis of middle inertia has grown, (1,) 1/s.
+
+    Where the wobble begins in w1, about the axis of least inertia, Euler's equations linearised
+    about the steady spin give w1 = w1(0) cosh(rate t): the rate follows from one later moment.
+    """
+    moment = min(int(np.abs(scene.times_s - GROWTH_S).argmin()), state.count - 1)
+    axis = int(state.body.axes_by_inertia[0, 0])
+    begun = quaternion.rotate_inverse(scene.start.rotation, scene.start.angular_velocity)
+    wobble = quaternion.rotate_inverse(state.rotation, state.angular_velocity)
+    grown = wobble[moment : moment + 1, axis] / begun[0, axis]
+    rate: Float64 = np.arccosh(grown) / scene.times_s[moment]
+    return rate
+
+
+POSITION: Final = Quantity(
+    "position",
+    "position error over {horizon} / distance from the start",
+    lambda scene, state: state.position - scene.start.position,
+)
+VELOCITY: Final = Quantity(
+    "velocity",
+    "velocity error over {horizon} / largest velocity",
+    lambda _, state: state.velocity,
+)
+ATTITUDE: Final = Quantity(
+    "attitude",
+    "attitude error over {horizon}, rad",
+    lambda _, state: state.rotation,
+    is_angle=True,
+)
+ANGULAR_VELOCITY: Final = Quantity(
+    "angular_velocity",
+    "angular velocity error over {horizon} / largest",
+    lambda _, state: state.angular_velocity,
+)
+ANGULAR_MOMENTUM: Final = Quantity(
+    "angular_momentum",
+    "angular momentum error over {horizon} / largest",
+    lambda _, state: state.angular_momentum,
+)
+ENERGY: Final = Quantity("energy", "energy error over {horizon} / largest energy", _energy)
+GROWTH: Final = Quantity("growth", "error of the wobble's growth rate, relative", _growth)
+
+
+@dataclass(frozen=True)
+class FreeScene:
+    """A free body with a known motion; a `roller_env.lab.experiment.Scene`."""
+
+    name: str
+    title: str
+    start: State
+    """One body at time 0."""
+    exact: Truth
+    quantities: tuple[Quantity, ...]
+    """What is measured; the first is what the chart shows."""
+    time_steps_s: Sequence[float]
+    """Largest first. Each divides a tenth of the horizon."""
+    acting: Acting = Acting()
+    horizon_s: float = 10.0
+    methods: Sequence[Method] = FREE
+    failure: float = FAILURE
+    limits_s: Mapping[str, float] = field(default_factory=dict)
+    """Time step above which theory expects a method to blow up, by its name."""
+
+    @property
+    def measures(self) -> Sequence[Measure]:
+        """See `Scene.measures`."""
+        horizon = f"{self.horizon_s:g} s"
+        return [
+            Measure(one.name, one.label.format(horizon=horizon), "discretisation")
+            for one in self.quantities
+        ]
+
+    @property
+    def moment_s(self) -> float:
+        """Time between two moments at which errors are taken, which every step must divide, s."""
+        return self.horizon_s / MOMENTS
+
+    @cached_property
+    def times_s(self) -> Float64:
+        """The moments at which errors are taken, (MOMENTS,) s."""
+        return np.arange(1.0, MOMENTS + 1.0) * self.moment_s
+
+    @cached_property
+    def truth(self) -> State:
+        """The true motion, a row for each moment."""
+        return self.exact(self.start.take([0] * MOMENTS), self.times_s)
+
+    def steps_to_a_moment(self, dt_s: float) -> int:
+        """Return the steps from one moment to the next.
+
+        Raises:
+            ValueError: when the time step does not divide the tenth of the horizon.
+        """
+        steps = round(self.moment_s / dt_s) if dt_s > 0.0 else 0
+        if steps < 1 or not math.isclose(steps * dt_s, self.moment_s, rel_tol=1e-9):
+            raise ValueError(
+                f"{self.name}: the time step must divide {self.moment_s:g} s (a tenth of the "
+                f"horizon), found {dt_s:g} s"
+            )
+        return steps
+
+    def trial(self, method: Method, dt_s: float) -> FreeTrial:
+        """See `Scene.trial`.
+
+        Raises:
+            ValueError: when ``dt_s`` does not divide a tenth of the horizon.
+        """
+        if isinstance(method, RigidBodyMethod):
+            return _RigidBodyTrial(self, method, dt_s)
+        return _MujocoTrial(self, method, dt_s)
+
+    def over(self, horizon_s: float) -> FreeScene:
+        """Return the scene over another time, with those of its time steps that divide that."""
+        moment_s = horizon_s / MOMENTS
+        fitting = [dt for dt in self.time_steps_s if dt <= moment_s * (1.0 + 1e-9)]
+        return replace(self, horizon_s=horizon_s, time_steps_s=fitting)
+
+    def errors(self, measured: State) -> dict[str, float]:
+        """Return the errors of a run by the name of their measure.
+
+        Args:
+            measured: a row for each of the scene's moments.
+        """
+        return {one.name: one.error(self, measured) for one in self.quantities}
+
+
+class FreeTrial(ABC):
+    """One run of a free scene; a `roller_env.lab.experiment.SteadyTrial`."""
+
+    def __init__(self, scene: FreeScene, dt_s: float, part_steps: int) -> None:
+        """Prepare a run with steps of ``dt_s`` seconds, of which ``part_steps`` are timed."""
+        self._scene, self._dt_s, self._part_steps = scene, dt_s, part_steps
+        self._steps = scene.steps_to_a_moment(dt_s)
+        self.part_s = part_steps * dt_s
+
+    @abstractmethod
+    def run(self) -> None:
+        """See `Trial.run`."""
+
+    @abstractmethod
+    def run_part(self) -> None:
+        """See `SteadyTrial.run_part`."""
+
+    @abstractmethod
+    def reached(self) -> State:
+        """Return where the last run was at the scene's moments, a row for each."""
+
+    def errors(self) -> dict[str, float]:
+        """See `Trial.errors`."""
+        with np.errstate(all="ignore"):  # a motion that blew up is a result
+            return self._scene.errors(self.reached())
+
+
+class _RigidBodyTrial(FreeTrial):
+    """One run of one of our integrators."""
+
+    def __init__(self, scene: FreeScene, method: RigidBodyMethod, dt_s: float) -> None:
+        super().__init__(scene, dt_s, _RIGID_BODY_PART_STEPS)
+        self._integrator, self._load = method.integrator, scene.acting.load()
+        self._path: list[State] = []
+
+    def run(self) -> None:
+        state, self._path = self._scene.start, []
+        for moment in range(MOMENTS):
+            state = self._advanced(state, self._steps, moment * self._steps * self._dt_s)
+            self._path.append(state)
+
+    def run_part(self) -> None:
+        self._advanced(self._scene.start, self._part_steps, 0.0)
+
+    def _advanced(self, state: State, steps: int, start_s: float) -> State:
+        with np.errstate(all="ignore"):
+            return advance(
+                state, self._integrator, self._dt_s, steps, load=self._load, start_s=start_s
+            )
+
+    def reached(self) -> State:
+        return self._scene.start.take([0] * MOMENTS).recalculate(
+            position=np.vstack([one.position for one in self._path]),
+            momentum=np.vstack([one.momentum for one in self._path]),
+            orientation=np.vstack([one.orientation for one in self._path]),
+            angular_momentum=np.vstack([one.angular_momentum for one in self._path]),
+        )
+
+
+class _MujocoTrial(FreeTrial):
+    """One run of MuJoCo's free joint, stepped in C."""
+
+    def __init__(self, scene: FreeScene, method: MujocoMethod, dt_s: float) -> None:
+        super().__init__(scene, dt_s, _MUJOCO_PART_STEPS)
+        self._model = free_model(scene.start.body, method, dt_s)
+        self._data = mujoco.MjData(self._model)
+        self._qpos = np.empty((MOMENTS, 7))
+        self._qvel = np.empty((MOMENTS, 6))
+
+    def _begin(self) -> None:
+        start, data = self._scene.start, self._data
+        mujoco.mj_resetData(self._model, data)
+        self._scene.acting.apply(self._model, data)
+        data.qpos[:3], data.qpos[3:] = start.position[0], start.orientation[0]
+        data.qvel[:3] = start.velocity[0]
+        # MuJoCo keeps a free joint's angular velocity in the body's frame.
+        data.qvel[3:] = quaternion.rotate_inverse(start.orientation, start.angular_velocity)[0]
+
+    def run(self) -> None:
+        self._begin()
+        with without_warnings():
+            for moment in range(MOMENTS):
+                mujoco.mj_step(self._model, self._data, self._steps)
+                self._qpos[moment], self._qvel[moment] = self._data.qpos, self._data.qvel
+
+    def run_part(self) -> None:
+        self._begin()
+        with without_warnings():
+            mujoco.mj_step(self._model, self._data, self._part_steps)
+
+    def reached(self) -> State:
+        rows = self._scene.start.take([0] * MOMENTS)
+        q = quaternion.normalise(self._qpos[:, 3:])
+        return rows.recalculate(
+            position=self._qpos[:, :3],
+            momentum=rows.body.mass[:, None] * self._qvel[:, :3],
+            orientation=q,
+            angular_momentum=quaternion.rotate(q, rows.body.inertia * self._qvel[:, 3:]),
+        )
+
+
+def free_model(body: Body, method: MujocoMethod, dt_s: float) -> mujoco.MjModel:
+    """Return a model of one free body, the first of ``body``, without a shape."""
+    spec = mujoco.MjSpec()
+    method.configure(spec, dt_s)
+    thing = spec.worldbody.add_body(
+        mass=body.mass[0], inertia=body.inertia[0], ipos=(0.0, 0.0, 0.0), explicitinertial=True
+    )
+    thing.add_freejoint()
+    return spec.compile()
+
+
+# --- the scenes ------------------------------------------------------------------------------
+
+GRAVITY_M_S2: Final[Vector] = (0.0, 0.0, -9.8)
+"""As the published free-box benchmark has it."""
+
+BENCHMARK_BOX: Final = Body.box((0.1, 0.4, 0.9), 10.0)
+"""Of github.com/scpeters/benchmark: I = (0.8083, 0.6833, 0.1417) kg m^2."""
+
+TOP: Final = Body.from_inertia((1.0, 2.0, 3.0))
+CUBE: Final = Body.cube(size=1.0, mass=1.0)
+"""The report's: I = 1/6 kg m^2."""
+
+WOBBLE: Final = 0.05
+"""Of the spin about the middle axis, about that of least inertia, at the start of the tumble."""
+
+GROWTH_S: Final = 1.0
+"""When the wobble's growth is read off: it is still small against the spin."""
+
+
+def one_two_five(largest_s: float, smallest_s: float) -> tuple[float, ...]:
+    """Return the time steps {1, 2, 5} x 10^k between two of them, largest first."""
+    decades = range(math.floor(math.log10(smallest_s)), math.ceil(math.log10(largest_s)) + 1)
+    steps = [float(f"{digit}e{decade}") for decade in decades for digit in (1, 2, 5)]
+    return tuple(sorted((s for s in steps if smallest_s <= s <= largest_s), reverse=True))
+
+
+def _thrown_top(state: State, t_s: Float64) -> State:
+    return exact.projectile(exact.asymmetric_top(state, t_s), t_s, GRAVITY_M_S2)
+
+
+SIMPLE_BOX: Final = FreeScene(
+    name="simple-box",
+    title="Weightless box turning about a principal axis",
+    start=State.create(BENCHMARK_BOX, velocity=(-0.9, 0.4, 0.1), angular_velocity=(0.5, 0.0, 0.0)),
+    exact=lambda state, t: exact.projectile(exact.constant_spin(state, t), t, _STILL),
+    quantities=(ATTITUDE, POSITION, VELOCITY, ENERGY, ANGULAR_MOMENTUM),
+    time_steps_s=one_two_five(1.0, 1e-4),
+)
+COMPLEX_BOX: Final = FreeScene(
+    name="complex-box",
+    title="Thrown box that tumbles about its middle axis",
+    start=State.create(BENCHMARK_BOX, velocity=(-2.0, 2.0, 8.0), angular_velocity=(0.1, 5.0, 0.1)),
+    exact=_thrown_top,
+    acting=Acting(gravity_m_s2=GRAVITY_M_S2),
+    quantities=(ATTITUDE, POSITION, VELOCITY, ENERGY, ANGULAR_MOMENTUM),
+    time_steps_s=one_two_five(0.2, 1e-4),
+)
+ASYMMETRIC_TOP: Final = FreeScene(
+    name="asymmetric-top",
+    title="Free body of three different moments of inertia",
+    start=State.create(TOP, angular_velocity=(1.5, 0.7, 2.0)),
+    exact=exact.asymmetric_top,
+    quantities=(ATTITUDE, ANGULAR_VELOCITY, ENERGY, ANGULAR_MOMENTUM),
+    time_steps_s=one_two_five(0.5, 1e-4),
+)
+MIDDLE_AXIS: Final = FreeScene(
+    name="middle-axis",
+    title="Spin about the middle axis, which turns over",
+    start=State.create(TOP, angular_velocity=(2.0 * WOBBLE, 2.0, 0.0)),
+    exact=exact.asymmetric_top,
+    quantities=(ATTITUDE, GROWTH, ENERGY, ANGULAR_MOMENTUM),
+    time_steps_s=one_two_five(0.5, 1e-4),
+)
+SYMMETRIC_TOP: Final = FreeScene(
+    name="symmetric-top",
+    title="Free symmetric top, wobbling",
+    start=State.create(Body.from_inertia((1.0, 1.0, 1.7)), angular_velocity=(1.0, 0.5, 2.0)),
+    exact=exact.symmetric_top,
+    quantities=(ATTITUDE, ANGULAR_VELOCITY, ENERGY, ANGULAR_MOMENTUM),
+    time_steps_s=one_two_five(0.5, 1e-4),
+)
+CONSTANT_SPIN: Final = FreeScene(
+    name="constant-spin",
+    title="Cube spinning freely at 3 rad/s",
+    start=State.create(CUBE, angular_velocity=(1.0, 2.0, 2.0)),
+    exact=exact.constant_spin,
+    quantities=(ATTITUDE, ENERGY, ANGULAR_MOMENTUM),
+    time_steps_s=one_two_five(1.0, 1e-4),
+)
+DAMPED_SPIN: Final = FreeScene(
+    name="damped-spin",
+    title="The report's cube: torque (1, 0, 0) - 0.1 ω",
+    start=State.create(CUBE),
+    acting=Acting(torque_nm=(1.0, 0.0, 0.0), spin_damping_nm_s=0.1),
+    exact=lambda state, t: exact.damped_spin(state, t, (1.0, 0.0, 0.0), 0.1),
+    quantities=(ATTITUDE, ANGULAR_MOMENTUM, ENERGY),
+    time_steps_s=one_two_five(1.0, 1e-4),
+)
+_REAL_LIMITS: Final = {1: 2.0, 2: 2.0, 3: 2.5127453266183286, 4: 2.785293563405282}
+"""Largest dt c / m without growth of a method whose stages are as many as its order: where its
+polynomial 1 - z + z^2/2 - ... has magnitude 1. By the order."""
+
+_DRAG_N_S_M: Final = 5.0
+_IMPLICITLY_DAMPED: Final = frozenset(m.name for m in MUJOCO) - {"MuJoCo RK4"}
+_COMPOSED: Final = frozenset({"ours splitting4"})
+
+DRAG: Final = FreeScene(
+    name="drag",
+    title="Pushed cube under linear drag, five times a second",
+    start=State.create(CUBE, velocity=(10.0, -4.0, 3.0)),
+    acting=Acting(force_n=(2.0, 0.0, 0.0), drag_n_s_m=_DRAG_N_S_M),
+    exact=lambda state, t: exact.linear_drag(state, t, _DRAG_N_S_M, (2.0, 0.0, 0.0)),
+    limits_s={
+        method.name: _REAL_LIMITS[method.order] * float(CUBE.mass[0]) / _DRAG_N_S_M
+        for method in FREE
+        if method.name not in _IMPLICITLY_DAMPED | _COMPOSED
+    },
+    quantities=(POSITION, VELOCITY, ENERGY),
+    time_steps_s=one_two_five(1.0, 1e-4),
+)
+PROJECTILE: Final = FreeScene(
+    name="projectile",
+    title="Thrown cube, in 2 s",
+    start=State.create(CUBE, velocity=(3.0, 0.0, 8.0)),
+    acting=Acting(gravity_m_s2=GRAVITY_M_S2),
+    exact=lambda state, t: exact.projectile(state, t, GRAVITY_M_S2),
+    quantities=(POSITION, VELOCITY, ENERGY),
+    time_steps_s=one_two_five(0.2, 1e-4),
+    horizon_s=2.0,
+)
+
+FREE_SCENES: Final = (
+    SIMPLE_BOX,
+    COMPLEX_BOX,
+    ASYMMETRIC_TOP,
+    MIDDLE_AXIS,
+    SYMMETRIC_TOP,
+    CONSTANT_SPIN,
+    DAMPED_SPIN,
+    DRAG,
+    PROJECTILE,
+)

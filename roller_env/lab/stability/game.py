@@ -1,0 +1,125 @@
+"""The product's own levels and presets, for experiments with the ball and without the rules."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.compile.compiled import CompiledLevel
+from roller_env.level import Level, load_level
+
+Float64 = npt.NDArray[np.float64]
+
+GROUND: Final[Mapping[str, Any]] = {"at": (0.0, 0.0, -2.0), "size": (400.0, 400.0, 4.0)}
+"""A wide thick floor with its upper face at z = 0."""
+
+
+def make_level(**pieces: Any) -> Level:
+    """Return a checked level of ``pieces``, on wide ground unless they say otherwise."""
+    plain: dict[str, Any] = {
+        "name": "experiment",
+        "start": {"at": (-150.0, -150.0, 0.4064)},
+        "finish": {"at": (190.0, 190.0, 0.5), "size": (1.0, 1.0, 1.0)},
+        "boxes": [dict(GROUND)],
+    }
+    return load_level(Level.model_validate(plain | pieces))
+
+
+@dataclass(frozen=True)
+class Course:
+    """A compiled level and where its ball begins.
+
+    Attributes:
+        compiled: the level.
+        at: of the ball's centre, m.
+        velocity: of the ball, m/s.
+        spin: rad/s, world frame.
+        force_n: held on the ball, N.
+        movers_m_s: velocity of every plate and gate, m/s, up positive.
+    """
+
+    compiled: CompiledLevel
+    at: Sequence[float]
+    velocity: Sequence[float] = (0.0, 0.0, 0.0)
+    spin: Sequence[float] = (0.0, 0.0, 0.0)
+    force_n: Sequence[float] = (0.0, 0.0, 0.0)
+    movers_m_s: float = 0.0
+
+    def prepare(self, data: mujoco.MjData) -> None:
+        """Put ``data`` to the beginning."""
+        mujoco.mj_resetData(self.compiled.model, data)
+        qpos, qvel = self.compiled.ball_qpos, self.compiled.ball_qvel
+        data.qpos[qpos : qpos + 3] = self.at
+        data.qvel[qvel : qvel + 3] = self.velocity
+        data.qvel[qvel + 3 : qvel + 6] = self.spin
+        data.ctrl[self.compiled.force_ctrl] = self.force_n
+        data.ctrl[self.compiled.plate_ctrl] = self.movers_m_s
+        data.ctrl[self.compiled.gate_ctrl] = self.movers_m_s
+
+    @property
+    def ball(self) -> slice:
+        """The ball's position in ``qpos``."""
+        return slice(self.compiled.ball_qpos, self.compiled.ball_qpos + 3)
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the ball did.
+
+    Attributes:
+        time_s: (n,).
+        position: (n, 3) m.
+        velocity: (n, 3) m/s.
+        energy: (n,) J for each kg: of motion, of spin and of height, less the held force's work.
+        depth: (n,) of the deepest contact, m; 0 in the air.
+        finite: whether all of it is.
+    """
+
+    time_s: Float64
+    position: Float64
+    velocity: Float64
+    energy: Float64
+    depth: Float64
+    finite: bool
+
+    @property
+    def speed(self) -> Float64:
+        """(n,) m/s."""
+        return np.asarray(np.linalg.norm(self.velocity, axis=1))
+
+
+def play(course: Course, seconds: float) -> Run:
+    """Simulate, and look at every step."""
+    compiled = course.compiled
+    model, level = compiled.model, compiled.level
+    data = mujoco.MjData(model)
+    course.prepare(data)
+    steps = round(seconds / compiled.preset.dt_s)
+    motion = np.full((steps + 1, 9), np.nan)
+    depth = np.zeros(steps + 1)
+    velocity = slice(compiled.ball_qvel, compiled.ball_qvel + 6)
+    for index in range(steps + 1):
+        # Contacts of this very position; the step below finds them again by itself.
+        mujoco.mj_fwdPosition(model, data)
+        motion[index, :3], motion[index, 3:] = data.qpos[course.ball], data.qvel[velocity]
+        depth[index] = -min(0.0, data.contact.dist.min()) if data.ncon else 0.0
+        if not np.abs(motion[index]).max() < 1e6:
+            break
+        mujoco.mj_step(model, data)
+    # A sphere's energy of spin for each kg is (R w)² / 5.
+    rim = level.ball.radius * motion[:, 6:]
+    energy = 0.5 * (motion[:, 3:6] ** 2).sum(1) + 0.2 * (rim**2).sum(1)
+    work = motion[:, :3] @ np.asarray(course.force_n, dtype=np.float64)
+    return Run(
+        time_s=np.arange(steps + 1, dtype=np.float64) * compiled.preset.dt_s,
+        position=motion[:, :3],
+        velocity=motion[:, 3:6],
+        energy=energy + level.gravity * motion[:, 2] - work / level.ball.mass_kg,
+        depth=depth,
+        finite=bool(np.abs(motion).max() < 1e6),
+    )

@@ -1,0 +1,117 @@
+"""Fly the report's rigid body and MuJoCo's free joint side by side, and show where they part.
+
+Examples::
+
+    python scripts/parallel_cube.py
+    python scripts/parallel_cube.py --body cube --scene keys --keys 0=W 1=WA 2.5=
+    python scripts/parallel_cube.py --body box --scene torque --method splitting4 --dt 0.002
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from tqdm import tqdm
+
+from roller_env.lab import parallel, parallel_charts, style
+from roller_env.lab.provenance import header, provenance
+from roller_env.lab.tables import write_rows
+from roller_env.rigid_body import integrator
+
+_QUICK_S = 0.5
+"""Seconds of flight of a quick run."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """Fly the report's rigid body and MuJoCo's free joint side by side."""
+
+    body: str = "all"
+    """cube, box or all."""
+
+    scene: str = "all"
+    """drift, ballistic, keys, lift, damping, torque or all."""
+
+    dt: float = 1e-3
+    """Time step of both, seconds."""
+
+    duration: float = 10.0
+    """Of every flight, seconds."""
+
+    keys: Annotated[tuple[str, ...], tyro.conf.arg(metavar="TIME=KEYS")] = ()
+    """Another sequence for the scene keys: time in seconds and what is held from then on."""
+
+    method: str = "rk4"
+    """Ours: an integrator of roller_env.rigid_body."""
+
+    integrator: str = "RK4"
+    """MuJoCo's: Euler, implicit, implicitfast, discrete or RK4."""
+
+    out: Path = Path("runs/parallel_cube")
+    """Directory of the tables and pictures."""
+
+    quick: bool = False
+    """Fly for half a second."""
+
+
+def settings_of(arguments: Arguments) -> parallel.Settings:
+    """Return what the command line asks for.
+
+    Raises:
+        ValueError: when it asks for something that does not exist or does not fit together.
+    """
+    scenes = dict(parallel.SCENES)
+    if arguments.keys:
+        scenes["keys"] = replace(scenes["keys"], held=parallel.parsed_keys(arguments.keys))
+    names = parallel.chosen_several("scene", arguments.scene, scenes)
+    return parallel.Settings(
+        bodies=parallel.chosen_several("body", arguments.body, parallel.BODIES),
+        scenes=tuple(scenes[name] for name in names),
+        ours=integrator(arguments.method),
+        mujoco=parallel.mujoco_method(arguments.integrator),
+        dt_s=arguments.dt,
+        duration_s=_QUICK_S if arguments.quick else arguments.duration,
+    )
+
+
+def main(settings: parallel.Settings, out: Path) -> None:
+    """Fly, write and draw."""
+    facts = provenance()
+    print(header(facts))
+    verdicts: list[parallel.Verdict] = []
+    samples: list[parallel.Sample] = []
+    remedies: list[parallel.Remedy] = []
+    for body in settings.bodies:
+        summary, course = parallel.compare(settings, body)
+        verdicts += summary
+        samples += course
+        style.save(parallel_charts.draw_flights(settings, body, course), facts, out / body)
+    print(f"\nLargest differences between the two:\n\n{parallel_charts.verdict_table(verdicts)}")
+    write_rows(verdicts, facts, out / "verdicts")
+    write_rows(samples, facts, out / "differences")
+    # On a cube angular velocity is angular momentum over a number in any axes: nothing to mend.
+    for body in (name for name in settings.bodies if not parallel.BODIES[name].isotropic):
+        tried = tqdm(parallel.remedies(settings, body), f"the {body}, other methods", unit="run")
+        mended = [row for rows in tried for row in rows]
+        remedies += mended
+        style.save(
+            parallel_charts.draw_remedies(settings, body, mended), facts, out / f"{body}_remedies"
+        )
+        print(f"\nThe {body}'s largest attitude differences from {settings.mujoco.name}:\n")
+        print(parallel_charts.remedy_table(mended))
+    if remedies:
+        write_rows(remedies, facts, out / "remedies")
+    print(f"Tables and pictures: {out}")
+
+
+if __name__ == "__main__":
+    given = tyro.cli(Arguments, description=__doc__)
+    try:
+        wanted = settings_of(given)
+    except ValueError as error:
+        sys.exit(f"error: {error}")
+    main(wanted, given.out)

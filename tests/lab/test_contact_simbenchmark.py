@@ -1,0 +1,132 @@
+"""SimBenchmark's measures by hand and against its own published numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from roller_env.lab.contact.simbenchmark import (
+    BOUNCING,
+    DROPPED_PILE,
+    PILE,
+    PUBLISHED,
+    ROLLING_XY,
+    ROLLING_Y,
+    SIMBENCHMARK,
+    Published,
+    Rolling,
+    squared_penetration,
+)
+from roller_env.lab.methods import MujocoMethod
+
+SCENES = {scene.name: scene for scene in SIMBENCHMARK}
+
+
+def published(test: str, engine: str, dt_s: float) -> Published:
+    (row,) = [one for one in PUBLISHED if (one.test, one.engine, one.dt_s) == (test, engine, dt_s)]
+    return row
+
+
+def test_every_published_row_stands_beside_a_scene() -> None:
+    assert {row.test for row in PUBLISHED} == set(SCENES)
+    for row in PUBLISHED:
+        assert row.dt_s in SCENES[row.test].time_steps_s
+
+
+def test_the_box_and_the_balls_accelerate_as_worked_out_by_hand() -> None:
+    """f1 = 0.4 * 35 * 9.81 = 137.34 N; f2 = 12.66 / 10 / (3.5 + 2.5) = 0.211 N."""
+    box, ball = ROLLING_Y.accelerations_m_s2
+    assert box == pytest.approx((150.0 - 137.34 - 25 * 0.211) / 10.0)
+    assert ball == pytest.approx(0.211)
+
+
+@pytest.mark.parametrize("scene", [ROLLING_Y, ROLLING_XY], ids=lambda scene: scene.name)
+def test_exact_velocities_have_no_error(scene: Rolling) -> None:
+    time = np.linspace(0.0, 1.0, 11)
+    way = np.array([*scene.direction, 0.0])
+    box, ball = (np.multiply.outer(a * time, way) for a in scene.accelerations_m_s2)
+    assert scene.error(time, box, ball) == pytest.approx(0.0, abs=1e-30)
+    box[3] += (0.1, 0.0, -0.2)
+    assert scene.error(time, box, ball) == pytest.approx(0.05 / 10)
+
+
+def test_a_box_that_does_not_move_has_the_error_published_for_those_that_did_not() -> None:
+    """ODE's and DART's friction pyramids held the box; their figure is the closed form's."""
+    time = np.linspace(0.0, 4.0, 4001)
+    still = np.zeros((4001, 3))
+    row = published("rolling-xy", "ODE quick", 1e-3)
+    assert ROLLING_XY.error(time, still, still) == pytest.approx(row.error, rel=2e-6)
+
+
+@pytest.mark.parametrize("scene", [ROLLING_Y, ROLLING_XY], ids=lambda scene: scene.name)
+def test_rolling_errs_as_mujoco_150_did(scene: Rolling) -> None:
+    """The box hops on its soft contact as it slides, so the figure is one of a band.
+
+    SimBenchmark's own rows of one integrator spread by 1.4 with solver and tolerance.
+    """
+    row = published(scene.name, "MuJoCo 1.50 CG Euler", 1e-3)
+    error = scene.trial(MujocoMethod("Euler"), 1e-3).errors()["velocity"]
+    assert row.error / 1.5 < error < row.error * 1.5
+
+
+def test_the_pyramidal_cone_lets_the_box_run_away_unless_pushed_along_an_edge() -> None:
+    method = MujocoMethod("Euler", "pyramidal")
+    assert ROLLING_Y.trial(method, 0.01).errors()["velocity"] < ROLLING_Y.failure
+    assert ROLLING_XY.trial(method, 0.01).errors()["velocity"] > 10.0 * ROLLING_XY.failure
+
+
+def test_the_energy_error_by_hand() -> None:
+    """Two samples count and the last does not; in one every ball is 1 mm high and spins."""
+    assert BOUNCING.energy_j == pytest.approx(24034.5)
+    height = np.full((3, 49), 5.0)
+    velocity = np.zeros((3, 49, 6))
+    height[1] += 1e-3
+    velocity[1, :, 3] = 2.0
+    height[2] = -1.0
+    off = 49 * (10.0 * 9.81 * 1e-3 + 0.5 * (0.4 * 10.0 * 0.1**2) * 4.0)
+    assert BOUNCING.error(height, velocity) == pytest.approx(off**2 / 2.0)
+
+
+def test_the_games_elasticity_closes_the_row_that_mujoco_lacked() -> None:
+    """As the Euler engines of the published table, whose flights have the same error."""
+    error = BOUNCING.trial(MujocoMethod("Euler"), 0.01).errors()["energy"]
+    assert error < published("bouncing", "Bullet", 1e-2).error
+    assert error < published("bouncing", "DART Dantzig", 1e-2).error
+
+
+def test_the_discrete_integrator_loses_the_energy() -> None:
+    errors = BOUNCING.trial(MujocoMethod("discrete"), 0.02).errors()
+    assert errors["energy"] > BOUNCING.failure
+
+
+def test_the_penetration_by_hand() -> None:
+    """Balls of 0.1 m: two 0.15 m apart, the third 0.05 m into the ground and far away."""
+    centres = np.array([[0.0, 0.0, 1.0], [0.15, 0.0, 1.0], [5.0, 5.0, 0.05]])
+    assert squared_penetration(centres, 0.1) == pytest.approx(0.05**2 + 0.05**2)
+
+
+def test_all_balls_at_the_origin_by_hand() -> None:
+    assert math.comb(216, 2) == 23_220
+    assert DROPPED_PILE.empty_sample_m2 == pytest.approx(23_220 * 0.2**2 + 216 * 0.1**2)
+
+
+def test_the_published_666_of_mujoco_is_its_empty_first_sample() -> None:
+    row = published("666-dropped", "MuJoCo 1.50 CG Euler", 1e-2)
+    errors = DROPPED_PILE.trial(MujocoMethod("Euler"), 1e-2).errors()
+    assert errors["as_published"] == pytest.approx(row.error, rel=2e-3)
+    assert errors["penetration"] < row.error / 200.0
+
+
+def test_the_pile_overlaps_less_than_with_the_rigid_contacts_published() -> None:
+    error = PILE.trial(MujocoMethod("Euler"), 1e-2).errors()["penetration"]
+    assert error < published("666", "RaiSim", 1e-2).error / 10.0
+
+
+def test_the_pile_begins_without_overlap_and_the_same_every_time() -> None:
+    short = replace(PILE, horizon_s=2.0)
+    one, two = (short.trial(MujocoMethod("Euler"), 0.02).path.qpos for _ in range(2))
+    np.testing.assert_array_equal(one, two)
+    assert squared_penetration(one[0].reshape(216, 7)[:, :3], 0.1) == 0.0

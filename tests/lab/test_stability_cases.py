@@ -1,0 +1,149 @@
+"""What fails, what cures it, and what the game's own pieces do to the ball."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import mujoco
+import pytest
+
+from roller_env.compile.compiled import compile_level
+from roller_env.lab.stability import run
+from roller_env.lab.stability.cases import FULL, QUICK
+from roller_env.lab.stability.failure import record, rows
+from roller_env.lab.stability.failures import FAILURES, hanging_gate_level
+from roller_env.lab.stability.game import Course, play
+from roller_env.lab.stability.hard_cases import ALL_PRESETS, HARD_CASES, run_case
+from roller_env.lab.stability.limits import CASES
+
+KNOWN_TO_FAIL = {
+    ("gate_closing_on_the_ball", "accurate", "greatest speed, m/s"),
+    ("tile_seams_at_full_speed", "fast", "greatest bump, mm"),
+    ("lane_of_seams", "fast", "greatest bump, mm"),
+    ("lane_of_seams", "fast", "speed lost on the way, %"),
+    ("lane_of_seams", "default", "greatest bump, mm"),
+    ("lane_of_seams", "default", "speed lost on the way, %"),
+    ("skidding", "fast", "hop at 4 m/s of slip, mm"),
+    ("skidding", "default", "hop at 4 m/s of slip, mm"),
+}
+"""Case, preset and reading, with more starts than a test has; each case's note has the reason."""
+
+
+@pytest.mark.parametrize("name", HARD_CASES)
+def test_a_hard_case_of_the_game_is_within_what_is_acceptable(name: str) -> None:
+    found = run_case(HARD_CASES[name], ALL_PRESETS, QUICK)
+    assert {row.preset for row in found} == {preset.name for preset in ALL_PRESETS}
+    failing = {(row.case, row.preset, row.quantity) for row in found if row.verdict == "fails"}
+    assert failing <= KNOWN_TO_FAIL
+
+
+def test_what_is_known_to_fail_has_a_note() -> None:
+    assert all(HARD_CASES[case].note for case, _, _ in KNOWN_TO_FAIL)
+
+
+@pytest.mark.parametrize("name", FAILURES)
+def test_a_failure_fails_and_its_cures_cure_it(name: str) -> None:
+    failure = FAILURES[name]()
+    records = [record(setting, failure.seconds) for setting in failure.settings]
+    found = rows(failure, records, repeats=1)
+    assert [row.role for row in found] == ["fails", *["cures"] * (len(found) - 1)]
+    assert [row.verdict for row in found] == ["fails", *["holds"] * (len(found) - 1)]
+    assert found[0].time_ratio == found[0].evaluations_ratio == 1.0
+    assert all(row.time_ratio > 0.0 for row in found)
+
+
+def test_the_game_experiments_see_every_step_and_no_step_that_they_cause() -> None:
+    """Looking at the contacts between two steps changes nothing."""
+    compiled = compile_level(hanging_gate_level(0.4), "fast")
+    course = Course(compiled, (0.1, 0.0, 0.4064), force_n=(1.0, 2.0, 0.0), movers_m_s=-0.8)
+    seen = play(course, 1.0)
+    data = mujoco.MjData(compiled.model)
+    course.prepare(data)
+    mujoco.mj_step(compiled.model, data, len(seen.time_s) - 1)
+    assert seen.position[-1].tolist() == data.qpos[course.ball].tolist()
+    assert seen.finite
+    assert seen.depth.max() > 0.0
+
+
+def test_a_falling_ball_keeps_its_energy() -> None:
+    compiled = compile_level(hanging_gate_level(0.4), "accurate")
+    seen = play(Course(compiled, (50.0, 0.0, 30.0), (3.0, 0.0, 4.0), spin=(1.0, 2.0, 3.0)), 1.0)
+    assert seen.energy == pytest.approx(seen.energy[0], rel=1e-9)
+
+
+# The script's side ---------------------------------------------------------------------------
+
+
+def test_without_names_everything_is_selected() -> None:
+    selection = run.select((), FULL)
+    assert selection.limits == tuple(CASES)
+    assert selection.failures == tuple(FAILURES)
+    assert selection.hard_cases == tuple(HARD_CASES)
+
+
+def test_a_quick_run_leaves_out_slow_limits_unless_they_are_named() -> None:
+    slow = next(name for name, case in CASES.items() if not case.quick)
+    assert slow not in run.select((), QUICK).limits
+    assert run.select((slow,), QUICK).limits == (slow,)
+
+
+def test_a_name_that_is_a_group_and_a_failure_means_both() -> None:
+    selection = run.select(("tunnelling",), QUICK)
+    assert selection.failures == ("tunnelling",)
+    assert "tunnelling_2ms" in selection.limits
+    assert not selection.hard_cases
+
+
+@pytest.mark.parametrize(
+    ("wrong", "near"),
+    [("tunneling", "tunnelling"), ("hard-cases", "hard_cases"), ("servo_rk4_2", "servo_rk4_1")],
+)
+def test_an_unknown_name_is_refused_with_the_nearest(wrong: str, near: str) -> None:
+    with pytest.raises(ValueError, match=f"found '{wrong}'.*did you mean '{near}'"):
+        run.select((wrong,), QUICK)
+
+
+def test_results_are_written_as_tables_and_pictures(tmp_path: Path) -> None:
+    names = ("spin_aliasing_lie_rk4", "servo_discrete_1", "hop_240hz", "bent_heading", "skidding")
+    selection = run.select(names, QUICK)
+    seen: list[str] = []
+
+    def wrap(all_names: Sequence[str]) -> Iterable[str]:
+        seen.extend(all_names)
+        return seen
+
+    results = run.run(selection, QUICK, wrap)
+    assert seen == [
+        "limits/servo_discrete_1",
+        "limits/spin_aliasing_lie_rk4",
+        "limits/hop_240hz",
+        "failures/bent_heading",
+        "hard_cases/skidding",
+    ]
+    written = run.write(results, {"machine": "a test's"}, tmp_path)
+    assert all(path.stat().st_size > 0 for path in written)
+    assert {path.name for path in (tmp_path / "pictures").iterdir()} == {
+        f"{name}.{suffix}"
+        for name in ("bent_heading", "limits", "hard_cases")
+        for suffix in ("png", "svg")
+    }
+    document = json.loads((tmp_path / "limits.json").read_text())
+    assert document["provenance"] == {"machine": "a test's"}
+    # None where there is no limit: strict JSON has no infinity.
+    assert [row["measured"] is None for row in document["rows"]] == [True, False, False]
+    lines = (tmp_path / "hard_cases.csv").read_text().splitlines()
+    assert lines[0].startswith("# machine")
+    table = list(csv.DictReader(lines[1:]))
+    assert {row["preset"] for row in table} == {"fast", "default", "accurate"}
+    assert "none to 20" in (tmp_path / "limits.md").read_text()
+    assert "**" in (tmp_path / "hard_cases.md").read_text(), "what is too much is bold"
+
+
+def test_the_summary_names_what_does_not_hold() -> None:
+    results = run.Results(hard_cases=run_case(HARD_CASES["skidding"], ALL_PRESETS, QUICK))
+    (line,) = run.summary(results)
+    assert "13 of 15" in line
+    assert "skidding (default, hop at 4 m/s of slip, mm)" in line
