@@ -33,6 +33,14 @@ SERVO_FREQUENCY: Final = 200.0
 """Natural frequency of the plates' and gates' servos, rad/s. They trail their set-point by
 2 speed / frequency (8 mm for a gate) and implicitfast is stable up to dt = 4.8 / frequency."""
 
+SERVO_G: Final = 100.0
+"""Most force of a servo over the weight of what it moves, in standard gravities. Ample for keeping
+its speed with the ball on it; without a limit a gate that closes on the ball shoots it away at
+50 m/s, since nothing rigid gives way (``scripts/stability.py``, gate_closing_on_the_ball)."""
+
+STANDARD_GRAVITY: Final = 9.80665
+"""m/s^2, by definition."""
+
 MIDPHASE_GEOMS: Final = 150
 """Geoms up to which the ball is tested against every bounding box in turn. MuJoCo's tree of boxes
 (the midphase) finds the same contacts, to the bit; measured, it costs 0.3 to 0.5 us of a step of 6
@@ -70,6 +78,9 @@ def _set_options(spec: mujoco.MjSpec, level: Level, preset: PhysicsPreset) -> No
     option.impratio = preset.impratio
     option.iterations = preset.iterations
     option.tolerance = preset.tolerance
+    # Islands are solved apart where many bodies touch; one ball is one island, and looking for it
+    # costs 7 % of a step.
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
     # MuJoCo 4.0.0's sparse Newton Hessian is wrong (fixed in 4.0.1), and "auto" may choose it.
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
 
@@ -182,6 +193,9 @@ def _add_mover(
     servo.biasprm[1:3] = [-kp, -2.0 * mass * SERVO_FREQUENCY]
     servo.actlimited = True
     servo.actrange = [travel, 0.0]
+    most = SERVO_G * mass * STANDARD_GRAVITY
+    servo.forcelimited = True
+    servo.forcerange = [-most, most]
 
 
 def _quaternion(rotation: np.ndarray) -> np.ndarray:

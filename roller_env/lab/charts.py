@@ -32,7 +32,7 @@ from roller_env.lab.experiment import ErrorKind, Measure, Point, Scene
 from roller_env.lab.style import PREDICTION, STYLE, colour, save
 
 LEAST_ERROR: Final = 1e-16
-LARGEST_ERROR: Final = 10.0
+LARGEST_ERROR: Final = 1e12
 """Errors beyond these two are drawn at them."""
 
 SAME_ERROR: Final = 0.01

@@ -59,7 +59,8 @@ def save(figure: Figure, facts: dict[str, str], stem: Path) -> tuple[Path, Path]
         0.005, 0.004, header(facts), fontsize=6, color="#777777", ha="left", va="bottom", wrap=True
     )
     stem.parent.mkdir(parents=True, exist_ok=True)
-    png, svg = stem.with_suffix(".png"), stem.with_suffix(".svg")
+    # Not with_suffix: a scene's name may have a point in it.
+    png, svg = (stem.with_name(f"{stem.name}.{kind}") for kind in ("png", "svg"))
     with matplotlib.rc_context(STYLE):
         figure.savefig(png, dpi=150, facecolor="white")
         figure.savefig(svg, facecolor="white", metadata={"Date": None})

@@ -39,7 +39,7 @@ def write_rows(
     writer.writeheader()
     writer.writerows(records)
     stem.parent.mkdir(parents=True, exist_ok=True)
-    csv_file, json_file = stem.with_suffix(".csv"), stem.with_suffix(".json")
+    csv_file, json_file = (stem.with_name(f"{stem.name}.{kind}") for kind in ("csv", "json"))
     csv_file.write_text(text.getvalue(), encoding="utf-8")
     document = {"provenance": facts, "rows": records}
     json_file.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
