@@ -15,7 +15,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup train test lint format clean
+.PHONY: help setup train play test lint format clean
 .DELETE_ON_ERROR:
 
 help: ## show this list
@@ -36,13 +36,16 @@ $(READY): pyproject.toml constraints.txt
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
 		--constraint constraints.txt hatchling editables
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
-		--constraint constraints.txt --no-build-isolation --editable '.[train,lab,dev]'
+		--constraint constraints.txt --no-build-isolation --editable '.[train,lab,play,sound,demos,dev]'
 	@touch $(READY)
 	@echo "$(VENV) is ready."
 
 train: $(READY) ## train, evaluate and draw; goes on with an unfinished run
 	@$(BIN)/python scripts/train.py --config $(CONFIG) --seed $(SEED) --resume \
 		$(if $(NAME),--name $(NAME)) $(ARGS)
+
+play: $(READY) ## play in the browser, on this machine's port 8080
+	@$(BIN)/python scripts/play.py --level $(LEVEL) $(ARGS)
 
 test: $(READY) ## run the tests on all processors
 	@$(BIN)/python -m pytest --numprocesses auto $(ARGS)

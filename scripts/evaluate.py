@@ -19,6 +19,7 @@ from roller_env.level.errors import LevelError
 from roller_env.training import load_policy
 from roller_env.training.files import RunError, RunFiles
 from roller_env.training.pictures import draw_paths, record_video
+from roller_env.training.replays import save_replays
 from roller_env.training.report import markdown_table, write_evaluation
 from roller_env.training.run import evaluate_policy
 
@@ -39,6 +40,9 @@ class Arguments:
     seed: int | None = None
     """Of the environments; by default one that training never used."""
 
+    replays: Path | None = None
+    """Directory for a replay of every episode; scripts/replay.py verifies, shows and films them."""
+
     output: Path | None = None
     """Directory for the table, the episodes, the paths from above and a video."""
 
@@ -51,6 +55,9 @@ def main(arguments: Arguments) -> None:
         config = config.model_copy(update={"level": arguments.level})
     evaluation = evaluate_policy(policy, config, arguments.episodes, arguments.seed)
     print(markdown_table(evaluation, config))
+    if arguments.replays is not None:
+        save_replays(evaluation, config, arguments.replays, f"policy {arguments.run.name}")
+        print(f"{len(evaluation)} replays written to {arguments.replays}")
     if arguments.output is None:
         return
     arguments.output.mkdir(parents=True, exist_ok=True)

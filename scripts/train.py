@@ -4,11 +4,13 @@ Examples::
 
     python scripts/train.py --config configs/ppo_classic.yaml --seed 1
     python scripts/train.py --config configs/ppo_classic.yaml --seed 1 --resume
+    python scripts/train.py --config configs/ppo_classic.yaml --demos demonstrations --name taught
     python scripts/train.py --config configs/ppo_gate.yaml --set ppo.gamma=0.995 --name far-sighted
 """
 
 from __future__ import annotations
 
+import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +21,7 @@ import tyro
 from roller_env.level.errors import LevelError
 from roller_env.training import ConfigError, TrainingRun, load_config, train
 from roller_env.training.checkpoint import CheckpointError
+from roller_env.training.demonstrations import DemonstrationError
 from roller_env.training.files import RunError
 
 
@@ -38,6 +41,9 @@ class Arguments:
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FIELD=VALUE")] = ()
     """Other values than the configuration's, such as num_envs=64 ppo.gamma=0.995."""
 
+    demos: str | None = None
+    """Replays, or a Minari data set, that the policy learns to imitate before its first step."""
+
     resume: bool = False
     """Go on with a run that was stopped, even by a kill; says where the results are if none was."""
 
@@ -48,7 +54,8 @@ class Arguments:
 def main(arguments: Arguments) -> None:
     """Do what the command line says."""
     seed = () if arguments.seed is None else (f"seed={arguments.seed}",)
-    config = load_config(arguments.config, (*arguments.set, *seed))
+    demos = () if arguments.demos is None else (f"demonstrations={json.dumps(arguments.demos)}",)
+    config = load_config(arguments.config, (*arguments.set, *seed, *demos))
     name = arguments.name or f"{arguments.config.stem}-seed{config.seed}"
     directory = arguments.runs / name
     print(f"Training {config.algorithm.upper()} on {config.level}, seed {config.seed}: {directory}")
@@ -81,7 +88,7 @@ def print_results(run: TrainingRun) -> None:
 if __name__ == "__main__":
     try:
         main(tyro.cli(Arguments, description=__doc__))
-    except (ConfigError, RunError, CheckpointError, LevelError) as error:
+    except (ConfigError, RunError, CheckpointError, DemonstrationError, LevelError) as error:
         sys.exit(f"error: {error}")
     except KeyboardInterrupt:
         sys.exit("\nstopped; --resume goes on from the last checkpoint")

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from roller_env.level import shipped_levels
+from roller_env.replay import shipped_replays
 
 ROOT = Path(__file__).parents[1]
 
@@ -57,11 +58,12 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built
 
 
-def test_the_wheel_holds_every_level_and_says_that_it_is_typed(wheel: Path) -> None:
+def test_the_wheel_holds_every_level_and_replay_and_says_that_it_is_typed(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
     assert "roller_env/py.typed" in names
     assert {f"roller_env/assets/levels/{level}.yaml" for level in shipped_levels()} <= names
+    assert {f"roller_env/assets/replays/{level}.replay" for level in shipped_replays()} <= names
     assert not [name for name in names if name.startswith(("tests/", "scripts/", "configs/"))]
 
 

@@ -66,6 +66,10 @@ def build_spec(level: Level, preset: PhysicsPreset) -> mujoco.MjSpec:
         _add_mover(spec, level, preset, gate, gate.lowers_to, gate.yaw_deg)
     if len(spec.geoms) <= MIDPHASE_GEOMS:
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    else:
+        # Nothing of a level can fall asleep, for everything that moves has actuators. What the flag
+        # spares is posing every fixed geom anew in every step: 4 of 9 us on 600 geoms.
+        spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     return spec
 
 

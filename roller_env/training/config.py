@@ -65,6 +65,23 @@ class PPOConfig(_Frozen):
     activation: Literal["tanh", "relu", "elu"] = "tanh"
 
 
+class CloningConfig(_Frozen):
+    """Behaviour cloning, before the first step.
+
+    Attributes:
+        epochs: passes over the demonstrations; the policy kept is that of the epoch which was best
+            on the episodes held out.
+        batch_size: decisions of one gradient step.
+        learning_rate: of Adam.
+        held_out_share: of the episodes, not learnt from; one at least.
+    """
+
+    epochs: PositiveInt = 50
+    batch_size: PositiveInt = 256
+    learning_rate: PositiveFloat = 1e-3
+    held_out_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
+
+
 class TrainingConfig(_Frozen):
     """A training, whole: with the package's version it is all that a result depends on.
 
@@ -87,6 +104,10 @@ class TrainingConfig(_Frozen):
         evaluation_episodes: played by the trained policy for the evaluation table.
         evaluation_environment: options that are other ones then, such as ``physics: default``
             after a training with ``fast``.
+        evaluation_replays: whether every episode of the evaluation is kept as a replay.
+        demonstrations: replays or a Minari data set that the policy learns from before its first
+            step, as `roller_env.training.demonstrations.load_demonstrations` takes them.
+        cloning: how it learns from them.
         ppo: what the algorithm is told.
     """
 
@@ -104,6 +125,9 @@ class TrainingConfig(_Frozen):
     torch_threads: PositiveInt = 1
     evaluation_episodes: Annotated[int, Field(ge=2)] = 100
     evaluation_environment: Mapping[str, Any] = Field(default_factory=dict)
+    evaluation_replays: bool = False
+    demonstrations: str | None = None
+    cloning: CloningConfig = CloningConfig()
     ppo: PPOConfig = PPOConfig()
 
     @model_validator(mode="after")
@@ -222,8 +246,11 @@ def _override(content: dict[str, Any], override: str) -> None:
 def _problem(details: ErrorDetails, file: Path) -> Problem:
     path, message = details["loc"], details["msg"]
     if details["type"] == "extra_forbidden":
-        model = PPOConfig if path[:-1] == ("ppo",) else TrainingConfig
-        known = tuple(model.model_fields)
+        models: dict[tuple[Any, ...], type[BaseModel]] = {
+            ("ppo",): PPOConfig,
+            ("cloning",): CloningConfig,
+        }
+        known = tuple(models.get(path[:-1], TrainingConfig).model_fields)
         message = f"unknown field; known are {listed(known)}"
         return Problem(path, message, str(file), written=str(path[-1]), known=known)
     if path and not isinstance(details["input"], dict):

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.envs.sb3 import RollerVecEnv
+from roller_env.game.actions import forces
 from roller_env.level.expand import coin_positions
 from roller_env.level.schema import Level
 from roller_env.training.policy import Policy
@@ -48,6 +49,7 @@ class Episode:
         total_reward: undiscounted sum.
         steps: control steps.
         path: (steps, 3) float64 ball centre before every control step, world frame, metres.
+        force_n: (steps, 2) float64 newtons of the keys in every control step.
     """
 
     row: int
@@ -60,6 +62,7 @@ class Episode:
     total_reward: float
     steps: int
     path: npt.NDArray[np.float64]
+    force_n: npt.NDArray[np.float64]
 
     @property
     def outcome(self) -> str:
@@ -128,15 +131,20 @@ def evaluate(
     observations = environments.reset()
     ended: list[list[Episode]] = [[] for _ in range(environments.num_envs)]
     paths: list[list[npt.NDArray[np.float64]]] = [[] for _ in range(environments.num_envs)]
+    pushes: list[list[npt.NDArray[np.float64]]] = [[] for _ in range(environments.num_envs)]
     playing = set(range(environments.num_envs))
     while playing:
         positions = environments.simulation.ball_position.copy()
+        actions = policy(observations)
+        force_n = forces(environments.simulation.config.action, actions)
         for row in playing:
             paths[row].append(positions[row])
-        observations, _, dones, infos = environments.step(policy(observations))
+            pushes[row].append(force_n[row])
+        observations, _, dones, infos = environments.step(actions)
         for row in playing.intersection(np.flatnonzero(dones)):
-            ended[row].append(_episode(int(row), infos[row], np.array(paths[row])))
-            paths[row] = []
+            path, push = np.array(paths[row]), np.array(pushes[row])
+            ended[row].append(_episode(int(row), infos[row], path, push))
+            paths[row], pushes[row] = [], []
             if len(ended[row]) == episodes_per_row:
                 playing.remove(row)
     return Evaluation(
@@ -181,7 +189,12 @@ def mean_with_interval(values: Sequence[float]) -> Estimate:
     return Estimate(float(sample.mean()), float(low), float(high))
 
 
-def _episode(row: int, info: dict[str, Any], path: npt.NDArray[np.float64]) -> Episode:
+def _episode(
+    row: int,
+    info: dict[str, Any],
+    path: npt.NDArray[np.float64],
+    force_n: npt.NDArray[np.float64],
+) -> Episode:
     return Episode(
         row=row,
         success=bool(info["success"]),
@@ -193,4 +206,5 @@ def _episode(row: int, info: dict[str, Any], path: npt.NDArray[np.float64]) -> E
         total_reward=float(info["episode"]["r"]),
         steps=int(info["episode"]["l"]),
         path=path,
+        force_n=force_n,
     )

@@ -13,13 +13,16 @@ from typing import Any, Final
 
 from roller_env import __version__
 from roller_env.envs.sb3 import RollerVecEnv
+from roller_env.training.behaviour_cloning import start_from_demonstrations
 from roller_env.training.checkpoint import Progress
 from roller_env.training.config import TrainingConfig, load_config
+from roller_env.training.demonstrations import load_demonstrations
 from roller_env.training.evaluate import Evaluation, evaluate, rows_and_repeats
 from roller_env.training.files import RunError, RunFiles, only_one_process, write_atomically
 from roller_env.training.pictures import draw_paths, record_video
 from roller_env.training.policy import Policy, load_policy, save_policy
 from roller_env.training.ppo import learn
+from roller_env.training.replays import save_replays
 from roller_env.training.report import draw_learning_curve, markdown_table, write_evaluation
 
 EVALUATION_SEED_OFFSET: Final = 1_000_000
@@ -57,12 +60,21 @@ def train(config: TrainingConfig, directory: Path, *, resume: bool = False) -> T
         RunError: the directory holds another run, one that was not to be resumed, or one that
             another process is training.
         CheckpointError: the checkpoint is damaged.
+        DemonstrationError: the demonstrations cannot be used.
     """
     files = RunFiles(directory)
     with only_one_process(directory):
+        # Read first: a run is not to be begun with what cannot be learnt from.
+        demonstrations = (
+            load_demonstrations(config.demonstrations, config)
+            if config.demonstrations is not None and not files.checkpoint.exists()
+            else None
+        )
         _claim(config, files, resume)
         if files.summary.exists():
             return TrainingRun(files, json.loads(files.summary.read_text()), was_finished=True)
+        if demonstrations is not None:
+            print(start_from_demonstrations(config, demonstrations, files), flush=True)
         model, progress = learn(config, files)
         save_policy(model, files)
         start_s = time.monotonic()
@@ -73,6 +85,8 @@ def train(config: TrainingConfig, directory: Path, *, resume: bool = False) -> T
         draw_learning_curve(config, evaluation.coins_in_level, files)
         draw_paths(evaluation, files.paths)
         record_video(policy, config, evaluation.seed, files.video)
+        if config.evaluation_replays:
+            save_replays(evaluation, config, directory / "replays", f"policy {directory.name}")
         summary = _summary(config, progress, time.monotonic() - start_s)
         write_atomically(files.summary, json.dumps(summary, indent=2) + "\n")
         return TrainingRun(files, summary, was_finished=False)

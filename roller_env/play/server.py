@@ -1,0 +1,168 @@
+"""Where the game is shown: a browser page that this machine serves, or a window.
+
+MuJoCo Studio's web server has no password. As it comes it listens on all interfaces and takes
+WebSockets from pages of any origin; here it listens on this machine's loopback address only, and
+then takes them only from pages that this machine served, so that a page from elsewhere, open in
+the same browser, cannot reach the game either. (Read and tried with MuJoCo 4.0.0.)
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+from mujoco.studio import launch_thread, messages, plugin, viewer_handle, viewer_protocol
+
+LOOPBACK: Final = "127.0.0.1"
+DEFAULT_PORT: Final = 8080
+TITLE: Final = "Roller"
+
+LOCAL_ORIGINS: Final = (
+    re.compile(r"http://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?"),
+    # What is no browser sends no origin, and could send any.
+    None,
+)
+"""Origins of pages that this machine served: a tunnel's other end may have another port."""
+
+NATIVE_PYTHON: Final = (3, 12)
+"""Studio's window imports `collections.abc.Buffer`, which Python has since 3.12."""
+
+NATIVE_GRAPHICS: Final = "opengl_headless"
+"""The window shows pictures drawn off screen: to draw into the window itself ("opengl") fails in
+MuJoCo 4.0.0, in an empty scene too, with "Target not found"."""
+
+NATIVE_NOTE: Final = (
+    "note: MuJoCo 4.0.0's window shows the level but, where it was tried, neither panels nor sky; "
+    "Enter starts the game. The page (--viewer web) shows all of it."
+)
+
+Plugins = Sequence[plugin.Plugin]
+
+
+class PlayError(RuntimeError):
+    """The game cannot be shown; the message says why and what helps."""
+
+
+def open_page(
+    plugins: Plugins, *, port: int = 0, host: str = LOOPBACK
+) -> viewer_handle.ViewerHandle:
+    """Serve the game's page from a thread and return Studio's handle of it.
+
+    Args:
+        plugins: the game's, of `roller_env.play.app`.
+        port: to listen on; 0 takes the first free one from 8080.
+        host: address of the interface to listen on. Others than the loopback let everybody who
+            can reach it watch, play, and see the log.
+    """
+    # Imported here: a window needs none of it.
+    from mujoco.studio import web_viewer
+    from mujoco.studio.web import web_server
+
+    class PageViewer(web_viewer.WebViewer):  # type: ignore[misc]  # MuJoCo comes without types
+        """Studio's web viewer, bound to one address."""
+
+        @property
+        def _host(self) -> str:
+            return host
+
+        @_host.setter
+        def _host(self, _: str) -> None:
+            """Studio wants all interfaces, without asking: no."""
+
+        def _start_server(self) -> None:
+            origins = LOCAL_ORIGINS if host == LOOPBACK else None
+            web_server.serve = functools.partial(_plain_serve(), origins=origins)
+            super()._start_server()
+
+    def view(config: Any, endpoint: Any, viewers: Any) -> None:
+        viewer_protocol.run_viewer_loop(PageViewer(config, endpoint, plugins=viewers))
+
+    return _launch(view, plugins, viewer_protocol.ViewerConfig(title=TITLE, http_port=port))
+
+
+def open_window(plugins: Plugins) -> viewer_handle.ViewerHandle:
+    """Open a window with the game and return Studio's handle of it.
+
+    Raises:
+        PlayError: this Python is too old for Studio's window, or there is no window system.
+    """
+    if sys.version_info < NATIVE_PYTHON:
+        found = ".".join(map(str, sys.version_info[:3]))
+        raise PlayError(
+            f"a window needs Python 3.12 or newer (MuJoCo Studio's does), and this is {found}; "
+            "the browser page works here: --viewer web"
+        )
+    try:
+        from mujoco.studio import native_viewer
+    except ImportError as error:
+        raise PlayError(f"MuJoCo Studio's window does not load here: {error}") from error
+
+    class WindowViewer(native_viewer.NativeViewer):  # type: ignore[misc]
+        """Studio's window, which survives a change of the level.
+
+        To destroy a scene that has been drawn crashes in MuJoCo 4.0.0: scenes of levels that were
+        left are kept until the window is closed.
+        """
+
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            self._left: list[Any] = []
+            super().__init__(*arguments, **options)
+
+        def _sync_renderer(self, model: Any) -> None:
+            if id(model) != self._renderer_model_id:
+                self._left.append((self._model_scene, self._renderer._scenes.pop("scn", None)))
+            super()._sync_renderer(model)
+
+        def close(self) -> None:
+            self._left.clear()
+            super().close()
+
+    def view(config: Any, endpoint: Any, viewers: Any) -> None:
+        viewer_protocol.run_viewer_loop(WindowViewer(config, endpoint, plugins=viewers))
+
+    return _launch(view, plugins, viewer_protocol.ViewerConfig(title=TITLE, gfx=NATIVE_GRAPHICS))
+
+
+def run(handle: viewer_handle.ViewerHandle, ended: Callable[[], bool] = lambda: False) -> None:
+    """Let the game run until its window is closed, Ctrl+C is pressed, or ``ended`` says so.
+
+    Raises:
+        RuntimeError: the page cannot be served, such as on a port that is taken.
+    """
+    with handle:
+        handle.dispatch(messages.LoadModelEvent(path=""))
+        try:
+            while not ended() and handle.is_running():
+                handle.sync()
+        except KeyboardInterrupt:
+            print("\nGood bye.", flush=True)
+
+
+def warning_of(host: str) -> str | None:
+    """Return what listening on ``host`` means, if it is more than this machine."""
+    if host == LOOPBACK:
+        return None
+    return (
+        f"warning: listening on {host}. There is no password and no encryption: everybody who can "
+        "reach this address can watch, take the controls, and read the names of files in the log. "
+        f"Without --host only this machine can ('ssh -L {DEFAULT_PORT}:localhost:{DEFAULT_PORT}' "
+        "reaches it from another)."
+    )
+
+
+def _launch(
+    view: Callable[[Any, Any, Any], None], plugins: Plugins, config: viewer_protocol.ViewerConfig
+) -> viewer_handle.ViewerHandle:
+    viewers, simulations = plugin.split_plugins(plugins)
+    return launch_thread.launch_thread(
+        lambda endpoint: view(config, endpoint, viewers), sim_plugins=simulations
+    )
+
+
+def _plain_serve() -> Any:
+    from websockets.asyncio.server import serve
+
+    return serve

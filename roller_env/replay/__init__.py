@@ -1,0 +1,25 @@
+"""Replays: episodes on record, played again bit for bit, filmed, and turned into data sets."""
+
+from roller_env.replay.contents import Options, Replay, ReplayError, Result, Versions
+from roller_env.replay.file import load_replay, save_replay, shipped_replays
+from roller_env.replay.playback import Frame, Playback, Verification, frames, verify
+from roller_env.replay.recorder import Recorder, record_episode, replays_of
+
+__all__ = [
+    "Frame",
+    "Options",
+    "Playback",
+    "Recorder",
+    "Replay",
+    "ReplayError",
+    "Result",
+    "Verification",
+    "Versions",
+    "frames",
+    "load_replay",
+    "record_episode",
+    "replays_of",
+    "save_replay",
+    "shipped_replays",
+    "verify",
+]

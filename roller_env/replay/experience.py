@@ -1,0 +1,164 @@
+"""What an agent would have seen, done and earned in a replay's place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.envs.spaces import action_of_keys, shape_observation
+from roller_env.game.actions import DIRECTIONS, KEY_AXES, KEY_FORCE_N, KEYS, ActionMode, forces
+from roller_env.replay.contents import Replay, ReplayError
+from roller_env.replay.recorder import checksums, place_at_starts
+from roller_env.simulation import Simulation
+
+Float64 = npt.NDArray[np.float64]
+Bool = npt.NDArray[np.bool_]
+Observations = npt.NDArray[np.float32] | dict[str, npt.NDArray[np.float32]]
+
+
+@dataclass(frozen=True, eq=False)
+class Experience:
+    """One episode as an environment with the options asked for gives it.
+
+    It begins where the keys begin to work: while the intro runs, there is nothing to decide.
+
+    Attributes:
+        replay: whose it is.
+        observations: (T + 1, ...) float32, before the first step and after each; a dict of them
+            with the ``dict`` observation.
+        actions: (T,), (T, 4) or (T, 2), as the action mode has them.
+        rewards: (T,) float64.
+        terminated: (T,) as `RollerEnv.step` returned it.
+        truncated: (T,) likewise.
+    """
+
+    replay: Replay
+    observations: Observations
+    actions: npt.NDArray[Any]
+    rewards: Float64
+    terminated: Bool
+    truncated: Bool
+
+    def __len__(self) -> int:
+        """Return the number of steps."""
+        return len(self.rewards)
+
+
+def experiences(replays: Sequence[Replay], **changes: Any) -> list[Experience]:
+    """Play replays again and return what an agent would have seen, done and earned.
+
+    Args:
+        replays: of any levels and options.
+        changes: other options than the replays' own, such as ``observation="rays"`` or
+            ``reward="shaped"``, but none that changes the game or its steps.
+
+    Returns:
+        One for each replay, in their order.
+
+    Raises:
+        ReplayError: a replay is not exact here, or its forces are none of the action mode's.
+        ValueError: an option is wrong, or asks for pictures.
+    """
+    fixed = {"level", "physics", "control_dt_s", "max_episode_steps"} & changes.keys()
+    if fixed:
+        raise ValueError(f"{', '.join(sorted(fixed))}: these are the replay's own")
+    # Those of one game are played together.
+    groups: dict[tuple[str, str, bool], list[int]] = {}
+    for number, replay in enumerate(replays):
+        key = (replay.level_hash, replay.options.model_dump_json(), replay.intro)
+        groups.setdefault(key, []).append(number)
+    found: dict[int, Experience] = {}
+    for numbers in groups.values():
+        played = _play([replays[number] for number in numbers], changes)
+        found.update(zip(numbers, played, strict=True))
+    return [found[number] for number in range(len(replays))]
+
+
+def actions_of(mode: ActionMode, force_n: Float64) -> npt.NDArray[Any]:
+    """Return the actions that push with ``force_n``, (T, 2) newtons: `forces` the other way round.
+
+    Raises:
+        ReplayError: no action of that mode does.
+    """
+    push = force_n / KEY_FORCE_N
+    actions: npt.NDArray[Any]
+    if mode == "force":
+        actions = push.astype(np.float32)
+    else:
+        along = np.clip(np.round(push @ KEY_AXES.T), 0.0, 1.0).astype(np.int8)
+        actions = along if mode == "keys" else _DIRECTION_OF_KEYS[along @ _BITS]
+    wrong = np.flatnonzero((forces(mode, actions) != force_n).any(axis=1))
+    if len(wrong):
+        raise ReplayError(
+            f"the force of step {wrong[0]}, {force_n[wrong[0]].tolist()} N, is no action of mode "
+            f"{mode!r}; choose another with the option 'action'"
+        )
+    return actions
+
+
+_BITS = 2 ** np.arange(len(KEYS))
+
+_DIRECTION_OF_KEYS = np.array(
+    [
+        action_of_keys("directions", "".join(k for i, k in enumerate(KEYS) if bits >> i & 1))
+        for bits in range(2 ** len(KEYS))
+    ]
+)
+"""Number among `DIRECTIONS` of every combination of held keys, by its bits."""
+
+assert len(DIRECTIONS) == _DIRECTION_OF_KEYS.max() + 1, "every direction is a combination of keys"
+
+
+def _play(replays: list[Replay], changes: dict[str, Any]) -> list[Experience]:
+    """Play replays of one level and one set of options."""
+    config = replays[0].config(**changes)
+    if config.observation == "pixels":
+        raise ValueError("observation: pictures are not made again; choose state, rays or dict")
+    simulation = Simulation(config, len(replays))
+    place_at_starts(simulation, np.array([r.start for r in replays]), replays[0].intro)
+    lengths = np.array([len(replay) for replay in replays])
+    steps = int(lengths.max())
+    rows = np.arange(len(replays))
+    force = np.zeros((steps, len(replays), 2))
+    expected = np.zeros((steps + 1, len(replays)), dtype=np.uint32)
+    for row, replay in enumerate(replays):
+        force[: len(replay), row] = replay.force_n
+        expected[: len(replay) + 1, row] = replay.checksums
+    seen, reward = [simulation.observe()], np.zeros((steps, len(replays)))
+    terminated, truncated = (np.zeros((steps, len(replays)), dtype=bool) for _ in range(2))
+    # Control that comes back within a step does something in it.
+    waits = np.zeros(len(replays), dtype=np.int64)
+    _compare(simulation, rows, expected[0], 0)
+    for step in range(steps):
+        waits += simulation.state.control_delay_s >= simulation.duration_s
+        transition = simulation.step(force[step], hold=lengths <= step)
+        reward[step] = transition.reward
+        terminated[step], truncated[step] = transition.terminated, transition.truncated
+        seen.append(simulation.observe())
+        _compare(simulation, rows[lengths > step], expected[step + 1, lengths > step], step + 1)
+    table = np.stack(seen)
+    return [
+        Experience(
+            replay=replay,
+            observations=shape_observation(config, table[begin : end + 1, row]),
+            actions=actions_of(config.action, replay.force_n[begin:]),
+            rewards=reward[begin:end, row].copy(),
+            terminated=terminated[begin:end, row].copy(),
+            truncated=truncated[begin:end, row].copy(),
+        )
+        for row, (replay, begin, end) in enumerate(zip(replays, waits, lengths, strict=True))
+    ]
+
+
+def _compare(simulation: Simulation, rows: npt.NDArray[np.int64], expected: Any, step: int) -> None:
+    different = rows[checksums(simulation, rows) != expected]
+    if len(different):
+        raise ReplayError(
+            f"{len(different)} of {simulation.num_envs} replays of level "
+            f"{simulation.compiled.level.name!r} part at step {step}: they were recorded with "
+            "other versions, which scripts/replay.py names"
+        )

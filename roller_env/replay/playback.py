@@ -1,0 +1,202 @@
+"""Playing a replay again: step by step, from any moment, and bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.game.state import GameState
+from roller_env.replay.contents import Replay, Result, Versions
+from roller_env.replay.recorder import checksums, place_at_starts, result_of
+from roller_env.simulation import Simulation, Snapshot, Transition
+
+Float64 = npt.NDArray[np.float64]
+
+_KEYFRAMES: Final = 256
+"""Moments kept while playing, so that going back need not begin at the start."""
+
+_MIN_KEYFRAME_STEPS: Final = 32
+_ROW: Final = np.array([0])
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One moment of an episode.
+
+    Attributes:
+        step: control steps since the start.
+        time_s: likewise.
+        qpos: (nq,) MuJoCo's positions.
+        state: the game's state, one row.
+        force_n: (2,) newtons of the keys in the step that follows; zeros at the end.
+    """
+
+    step: int
+    time_s: float
+    qpos: Float64
+    state: GameState
+    force_n: Float64
+
+
+class Playback:
+    """A replay's game, which can be put to any moment of it.
+
+    Going forward plays; going back restores the nearest of a bounded number of snapshots and plays
+    from there. What draws a `Simulation` draws this one, in row 0.
+
+    Attributes:
+        replay: what is played.
+        simulation: the game as it stands; read it, and change it only through this object.
+        step: control steps since the start.
+    """
+
+    def __init__(self, replay: Replay, **changes: Any):
+        """Compile the level and stand at the start.
+
+        Args:
+            replay: what to play.
+            changes: other options of `EnvConfig`, such as ``observation``; see `Replay.config`.
+        """
+        self.replay = replay
+        self.simulation = Simulation(replay.config(**changes))
+        place_at_starts(self.simulation, np.array([replay.start]), replay.intro)
+        self.step = 0
+        self._spacing = max(_MIN_KEYFRAME_STEPS, -(-len(replay) // _KEYFRAMES))
+        self._keyframes: list[Snapshot] = [self.simulation.snapshot()]
+
+    def __len__(self) -> int:
+        """Return the number of control steps; there is one more moment than that."""
+        return len(self.replay)
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the whole episode."""
+        return len(self) * self.simulation.duration_s
+
+    def advance(self) -> Transition:
+        """Play one control step.
+
+        Raises:
+            IndexError: the replay is at its end.
+        """
+        if self.step >= len(self):
+            raise IndexError(f"step: found {self.step}; the replay ends there")
+        transition = self.simulation.step(self.replay.force_n[self.step : self.step + 1])
+        self.step += 1
+        if self.step == len(self._keyframes) * self._spacing:
+            self._keyframes.append(self.simulation.snapshot())
+        return transition
+
+    def seek(self, step: int) -> None:
+        """Go to the moment after ``step`` control steps; beyond the ends, to the nearer end."""
+        step = min(max(step, 0), len(self))
+        known = min(step // self._spacing, len(self._keyframes) - 1)
+        if step < self.step or known * self._spacing > self.step:
+            self.simulation.restore(self._keyframes[known])
+            self.step = known * self._spacing
+        while self.step < step:
+            self.advance()
+
+    def seek_time(self, time_s: float) -> None:
+        """Go to the last moment that is not after ``time_s``, seconds."""
+        # A time that was made by multiplying a step must not fall short of it by rounding.
+        self.seek(int(np.floor(time_s / self.simulation.duration_s + 1e-6)))
+
+    def frame(self, step: int | None = None) -> Frame:
+        """Return the moment after ``step`` control steps (None: this moment), as copies."""
+        if step is not None:
+            self.seek(step)
+        simulation, force = self.simulation, np.zeros(2)
+        if self.step < len(self):
+            force = self.replay.force_n[self.step].copy()
+        return Frame(
+            step=self.step,
+            time_s=self.step * simulation.duration_s,
+            qpos=simulation.qpos[0],
+            state=GameState(**simulation.state.copy_rows(_ROW)),
+            force_n=force,
+        )
+
+
+def frames(replay: Replay) -> Iterator[Frame]:
+    """Yield every moment of a replay, from the start to the end: one more than it has steps."""
+    playback = Playback(replay)
+    yield playback.frame()
+    while playback.step < len(playback):
+        playback.advance()
+        yield playback.frame()
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """What playing a replay again has shown.
+
+    Attributes:
+        steps: the replay's.
+        step_s: length of one.
+        parted_at: the first step after which the game's state was another than when it was
+            recorded, 0 if it began otherwise; None if it never was.
+        result: how the game ended this time.
+        recorded: how it ended then.
+        differences: what is of another version here than it was there.
+    """
+
+    steps: int
+    step_s: float
+    parted_at: int | None
+    result: Result
+    recorded: Result
+    differences: tuple[str, ...]
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the game was the same, bit for bit, and ended the same."""
+        return self.parted_at is None and self.result == self.recorded
+
+    def __str__(self) -> str:
+        """Say it in a line or a few."""
+        others = "; ".join(self.differences)
+        if self.is_exact:
+            note = f" (though recorded with {others})" if others else ""
+            return f"the same bit for bit over {self.steps} steps{note}"
+        if self.parted_at is None:
+            reason = f"recorded with {others}" if others else "its result was written by another"
+            return f"the same states bit for bit, but another result is recorded: {reason}"
+        if others:
+            reason = f"recorded with {others}"
+        else:
+            reason = (
+                "no version differs: the rules were changed since it was recorded, its processor "
+                "rounded otherwise, or the file was changed"
+            )
+        return (
+            f"parts at step {self.parted_at} of {self.steps} "
+            f"({self.parted_at * self.step_s:.2f} s): {reason}; "
+            f"it ended in {self.recorded.outcome!r} with {self.recorded.coins} coins, "
+            f"and now in {self.result.outcome!r} with {self.result.coins}"
+        )
+
+
+def verify(replay: Replay) -> Verification:
+    """Play a replay again and compare every step."""
+    playback = Playback(replay)
+    simulation = playback.simulation
+    now = np.empty(len(replay) + 1, dtype=np.uint32)
+    now[0] = checksums(simulation, _ROW)[0]
+    total_reward = 0.0
+    while playback.step < len(replay):
+        total_reward += float(playback.advance().reward[0])
+        now[playback.step] = checksums(simulation, _ROW)[0]
+    different = np.flatnonzero(now != replay.checksums)
+    return Verification(
+        steps=len(replay),
+        step_s=simulation.duration_s,
+        parted_at=int(different[0]) if len(different) else None,
+        result=result_of(simulation, 0, total_reward),
+        recorded=replay.result,
+        differences=replay.versions.differences(Versions.here()),
+    )

@@ -1,0 +1,237 @@
+"""Recording: what a simulation's rows are told, and checksums of what came of it."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.utils import seeding
+
+from roller_env.config import EnvConfig
+from roller_env.replay.contents import MAX_STEPS, Options, Replay, ReplayError, Result, Versions
+from roller_env.simulation import Simulation
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+
+
+@dataclass(slots=True)
+class _Take:
+    """One row's episode so far."""
+
+    start: tuple[float, float, float]
+    intro: bool
+    seed: int | None
+    forces: list[tuple[float, float]] = field(default_factory=list)
+    checksums: list[int] = field(default_factory=list)
+    total_reward: float = 0.0
+
+
+class Recorder:
+    """Remembers the episodes of some of a simulation's rows.
+
+    It is told of each beginning and each step and reads the rest from the simulation, which knows
+    nothing of it: a simulation without a recorder costs nothing, one with it some microseconds a
+    recorded row and step. `RollerEnv` and a `RollerVectorEnv` that does not reset in the same step
+    leave an ended game where the recorder can read it; `replays_of` records all others afterwards.
+    """
+
+    def __init__(self, simulation: Simulation, player: str = ""):
+        """Make a recorder of a simulation.
+
+        Args:
+            simulation: whose rows to record.
+            player: who plays, in words, such as ``human``.
+        """
+        self._simulation = simulation
+        self._player = player
+        self._takes: dict[int, _Take] = {}
+
+    def begin(self, rows: Sequence[int] | Int64 = (0,), seed: int | None = None) -> None:
+        """Record ``rows`` from here on, whose episodes have just begun.
+
+        Args:
+            rows: to record; what was recorded of them before is forgotten.
+            seed: what their generators were seeded with, to be told to whoever reads the replay.
+
+        Raises:
+            ValueError: a row's game is not at its beginning.
+        """
+        chosen = np.sort(np.asarray(rows, dtype=np.int64))
+        if len(chosen) == 0:
+            return
+        state = self._simulation.state
+        under_way = chosen[(state.steps[chosen] > 0) | state.over[chosen]]
+        if len(under_way):
+            raise ValueError(
+                f"rows: found {under_way.tolist()} under way; a recording begins right after reset"
+            )
+        positions = self._simulation.ball_position
+        now = checksums(self._simulation, chosen)
+        for row, checksum in zip(chosen.tolist(), now, strict=True):
+            x, y, z = positions[row].tolist()
+            take = _Take((x, y, z), bool(state.control_delay_s[row] > 0.0), seed)
+            take.checksums.append(int(checksum))
+            self._takes[row] = take
+
+    def record(self, force_n: Float64, reward: Float64) -> None:
+        """Remember a step that the simulation has just made; rows that it left alone are left out.
+
+        Args:
+            force_n: (N, 2) newtons, as given to `Simulation.step`.
+            reward: (N,) as it returned.
+
+        Raises:
+            ValueError: a row was reset or stepped meanwhile without the recorder being told.
+        """
+        steps = self._simulation.state.steps
+        made = [row for row, take in self._takes.items() if steps[row] != len(take.forces)]
+        if not made:
+            return
+        rows = np.sort(np.array(made))
+        now = checksums(self._simulation, rows)
+        for row, checksum in zip(rows.tolist(), now, strict=True):
+            take = self._takes[row]
+            if steps[row] != len(take.forces) + 1:
+                raise ValueError(
+                    f"row {row}: found it at step {steps[row]} after {len(take.forces)} recorded; "
+                    "tell the recorder of every step and every reset"
+                )
+            x, y = force_n[row].tolist()
+            take.forces.append((x, y))
+            take.checksums.append(int(checksum))
+            take.total_reward += float(reward[row])
+
+    def replay(self, row: int = 0) -> Replay:
+        """Return a row's episode as far as it has come.
+
+        Raises:
+            KeyError: the row is not recorded.
+            ReplayError: it is too long for a replay.
+        """
+        simulation, take = self._simulation, self._takes[row]
+        if len(take.forces) > MAX_STEPS:
+            raise ReplayError(f"{len(take.forces)} steps are too many; allowed are {MAX_STEPS}")
+        return Replay(
+            level=simulation.compiled.level,
+            options=Options.of(simulation.config),
+            start=take.start,
+            intro=take.intro,
+            force_n=np.array(take.forces, dtype=np.float64).reshape(-1, 2),
+            checksums=np.array(take.checksums, dtype=np.uint32),
+            result=result_of(simulation, row, take.total_reward),
+            versions=Versions.here(),
+            player=self._player,
+            seed=take.seed,
+        )
+
+
+def result_of(simulation: Simulation, row: int, total_reward: float) -> Result:
+    """Return how the game in a row stands, given the rewards it has earned."""
+    results = {name: value[0].item() for name, value in simulation.results(np.array([row])).items()}
+    truncated = bool(simulation.state.truncated[row])
+    return Result(**results, truncated=truncated, total_reward=total_reward)
+
+
+def checksums(simulation: Simulation, rows: Int64) -> npt.NDArray[np.uint32]:
+    """Return a CRC-32 of each row's whole state, (n,) uint32.
+
+    It is of MuJoCo's integration state and of the arrays of `GameState` in their order, but for
+    the waypoint: that follows from the path, is kept with the ``shaped`` reward only, and changes
+    nothing but the reward. CRC-32 is meant for accidents, which is what is looked for here.
+    """
+    snapshot = simulation.snapshot(rows)
+    game = (values for name, values in snapshot.game.items() if name != "waypoint")
+    table = np.concatenate(
+        [_bytes(values, len(rows)) for values in (snapshot.physics, *game)], axis=1
+    )
+    return np.array([zlib.crc32(row) for row in table], dtype=np.uint32)
+
+
+def _bytes(values: npt.NDArray[Any], count: int) -> npt.NDArray[np.uint8]:
+    return np.ascontiguousarray(values).reshape(count, -1).view(np.uint8)
+
+
+def place_at_starts(simulation: Simulation, starts: Float64, intro: bool) -> None:
+    """Begin an episode in every row, with the ball where it began before.
+
+    Args:
+        simulation: whose rows to reset.
+        starts: (N, 3) the balls' centres, metres, world frame.
+        intro: see `Simulation.reset`.
+    """
+    simulation.reset(intro=intro)
+    snapshot = simulation.snapshot()
+    # MuJoCo's integration state begins with the time and then qpos.
+    ball = 1 + simulation.compiled.ball_qpos
+    snapshot.physics[:, ball : ball + 3] = starts
+    simulation.restore(snapshot)
+
+
+def record_episode(
+    config: EnvConfig,
+    act: Callable[[Simulation], Float64],
+    *,
+    seed: int | None = None,
+    intro: bool = False,
+    player: str = "",
+) -> Replay:
+    """Play one episode to its end and return its replay.
+
+    Args:
+        config: of the game.
+        act: gives the keys' force, (1, 2) newtons, for the next step.
+        seed: of the row's generator, as `RollerEnv.reset` takes it.
+        intro: whether the keys work only after the intro.
+        player: who plays, in words.
+    """
+    simulation = Simulation(config)
+    simulation.seed([seeding.np_random(seed)[0]])
+    simulation.reset(intro=intro)
+    recorder = Recorder(simulation, player)
+    recorder.begin(seed=seed)
+    while not simulation.state.over[0]:
+        force = act(simulation)
+        recorder.record(force, simulation.step(force).reward)
+    return recorder.replay()
+
+
+def replays_of(
+    config: EnvConfig,
+    starts: Float64,
+    forces: Sequence[Float64],
+    *,
+    player: str = "",
+    seeds: Sequence[int | None] | None = None,
+) -> list[Replay]:
+    """Return replays of episodes of which only starts and forces were kept, by playing them again.
+
+    A row's bits do not depend on its neighbours, so these are the same games. That holds for games
+    played with this installation; forces from elsewhere make games of their own.
+
+    Args:
+        config: they were played in.
+        starts: (n, 3) the balls' centres at the beginning, metres.
+        forces: (T, 2) newtons for each, of any lengths; an episode that ends earlier is shorter.
+        player: who played, in words.
+        seeds: of each, if known.
+    """
+    if len(forces) == 0:
+        return []
+    simulation = Simulation(replace(config, num_threads=1), len(forces))
+    place_at_starts(simulation, starts, intro=False)
+    recorder = Recorder(simulation, player)
+    for row in range(len(forces)):
+        recorder.begin([row], seed=None if seeds is None else seeds[row])
+    lengths = np.array([len(force) for force in forces])
+    padded = np.zeros((int(lengths.max()), len(forces), 2))
+    for row, force in enumerate(forces):
+        padded[: len(force), row] = force
+    for step, force in enumerate(padded):
+        transition = simulation.step(force, hold=lengths <= step)
+        recorder.record(force, transition.reward)
+    return [recorder.replay(row) for row in range(len(forces))]

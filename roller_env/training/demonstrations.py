@@ -1,0 +1,184 @@
+"""Demonstrations: what was seen and done in episodes worth imitating."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast, get_args
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.config import EnvConfig, make_config
+from roller_env.envs.spaces import action_space, observation_space
+from roller_env.game.actions import ActionMode, forces
+from roller_env.game.rewards import RewardWeights
+from roller_env.level import load_level
+from roller_env.replay import Replay, ReplayError, load_replay
+from roller_env.replay.experience import actions_of, experiences
+from roller_env.replay.file import SUFFIX
+from roller_env.training.config import TrainingConfig
+from roller_env.training.policy import Observations
+
+
+class DemonstrationError(ValueError):
+    """Demonstrations that a training cannot begin with; the message says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Demonstration:
+    """One episode.
+
+    Attributes:
+        observations: (T, ...) float32, as the training's environment gives them.
+        actions: (T, ...) what was done then.
+        rewards: (T,) float64, what came of it in the training's environment; None if that is not
+            known, which it is not of a data set with other rewards.
+    """
+
+    observations: Observations
+    actions: npt.NDArray[Any]
+    rewards: npt.NDArray[np.float64] | None = None
+
+    def __len__(self) -> int:
+        """Return the number of decisions."""
+        return len(self.actions)
+
+
+def chosen(observations: Any, rows: Any) -> Any:
+    """Return some rows of observations, of each entry if they are a dict."""
+    if isinstance(observations, dict):
+        return {name: values[rows] for name, values in observations.items()}
+    return observations[rows]
+
+
+def load_demonstrations(source: str, config: TrainingConfig) -> list[Demonstration]:
+    """Read demonstrations for a training.
+
+    Args:
+        source: a replay file, a directory of them, a directory that holds a Minari data set, or
+            the name of one of this machine's (`roller_env.replay.datasets`).
+        config: of the training; replays are played again to be seen as its environment shows them.
+
+    Returns:
+        The episodes, at least two: one has to be held out.
+
+    Raises:
+        DemonstrationError: there are none, they are of another level, they cannot be read, or
+            other observations than the training's are in them.
+    """
+    wanted = make_config(level=config.level, **config.environment_options)
+    path = Path(source)
+    try:
+        if path.is_file() or list(path.glob(f"*{SUFFIX}")):
+            files = [path] if path.is_file() else sorted(path.glob(f"*{SUFFIX}"))
+            episodes = _from_replays([load_replay(file) for file in files], wanted)
+        else:
+            episodes = _from_minari(_data_set(source), wanted)
+    except ReplayError as error:
+        raise DemonstrationError(f"{source}: {error}") from None
+    if len(episodes) < 2:
+        raise DemonstrationError(
+            f"{source}: found {len(episodes)} episode; needed are two or more, since some are held "
+            "out to see what was learnt"
+        )
+    return episodes
+
+
+def _from_replays(replays: Sequence[Replay], wanted: EnvConfig) -> list[Demonstration]:
+    level = load_level(wanted.level)
+    for replay in replays:
+        if replay.level != level:
+            raise DemonstrationError(
+                f"found a replay of level {replay.level.name!r}, which is not the level "
+                f"{level.name!r} that is trained on, as it is now"
+            )
+    names = ("observation", "action", "reward", "reward_weights", "discount")
+    played = experiences(replays, **{name: getattr(wanted, name) for name in names})
+    return [
+        _thinned(
+            Demonstration(e.observations, e.actions, e.rewards),
+            wanted.control_dt_s / e.replay.options.control_dt_s,
+        )
+        for e in played
+    ]
+
+
+def _thinned(demonstration: Demonstration, ratio: float) -> Demonstration:
+    """Return an episode at control steps that are ``ratio`` times as long.
+
+    A person is asked for keys more often than an agent, and then mostly holds them.
+    """
+    rows = np.arange(0, len(demonstration), max(1, round(ratio)))
+    rewards = demonstration.rewards
+    return Demonstration(
+        observations=chosen(demonstration.observations, rows),
+        actions=demonstration.actions[rows],
+        rewards=None if rewards is None else np.add.reduceat(rewards, rows),
+    )
+
+
+def _data_set(source: str) -> Any:
+    try:
+        import minari
+    except ImportError:
+        raise DemonstrationError(
+            f"{source}: no such replay or directory of replays; for Minari's data sets, "
+            "pip install 'roller-env[demos]'"
+        ) from None
+    try:
+        if (Path(source) / "data").is_dir():
+            return minari.MinariDataset(Path(source) / "data")
+        return minari.load_dataset(source, download=False)
+    except (FileNotFoundError, ValueError) as error:
+        raise DemonstrationError(
+            f"{source}: no replay, directory of replays or Minari data set: {error}"
+        ) from None
+
+
+def _from_minari(data_set: Any, wanted: EnvConfig) -> list[Demonstration]:
+    found, needed = data_set.observation_space, observation_space(wanted)
+    if found != needed:
+        raise DemonstrationError(
+            f"{data_set.id}: its observations are {_brief(found)}; the training's are "
+            f"{_brief(needed)}"
+        )
+    spec, level = data_set.env_spec, load_level(wanted.level)
+    options: dict[str, Any] = {} if spec is None else spec.kwargs
+    if "level" in options and load_level(options["level"]) != level:
+        raise DemonstrationError(
+            f"{data_set.id}: found level {options['level']!r}, not {level.name!r}"
+        )
+    # A data set that names its environment was made with the default weights.
+    is_rewarded_so = wanted.reward_weights == RewardWeights() and (
+        (options.get("reward"), options.get("discount")) == (wanted.reward, wanted.discount)
+    )
+    ratio = wanted.control_dt_s / options.get("control_dt_s", wanted.control_dt_s)
+    mode = _action_mode(data_set, wanted)
+    return [
+        _thinned(
+            Demonstration(
+                observations=episode.observations,
+                actions=actions_of(wanted.action, forces(mode, episode.actions)),
+                rewards=np.asarray(episode.rewards, np.float64) if is_rewarded_so else None,
+            ),
+            ratio,
+        )
+        for episode in data_set.iterate_episodes()
+    ]
+
+
+def _action_mode(data_set: Any, wanted: EnvConfig) -> ActionMode:
+    """Return which of the game's action modes a data set's actions are of."""
+    for mode in get_args(ActionMode):
+        if data_set.action_space == action_space(replace(wanted, action=mode)):
+            return cast("ActionMode", mode)
+    found = _brief(data_set.action_space)
+    raise DemonstrationError(f"{data_set.id}: its actions, {found}, are not of this game")
+
+
+def _brief(space: gym.Space[Any]) -> str:
+    text = type(space).__name__
+    return f"{text}{space.shape}" if space.shape else str(space)

@@ -1,0 +1,88 @@
+"""Let the scripted player play, and keep what it does as replays.
+
+Without options it makes the demonstrations that are shipped, one a level; do so after changing a
+level, a material, a preset or the rules. With --episodes it makes demonstrations to learn from.
+
+Examples::
+
+    python scripts/make_demonstrations.py
+    python scripts/make_demonstrations.py classic --episodes 40 --slips 0.1 --output demonstrations
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from tqdm import tqdm
+
+from roller_env.config import EnvConfig
+from roller_env.level import Level, LevelError, levels_directory, load_level, shipped_levels
+from roller_env.replay import load_replay, record_episode, save_replay, verify
+from roller_env.replay.scripted import ScriptedPlayer
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """Let the scripted player play, and keep what it does as replays."""
+
+    levels: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
+    """Names or files of the levels; by default all that are shipped."""
+
+    output: Path = levels_directory().parent / "replays"
+    """Directory for them: LEVEL.replay, or LEVEL-NUMBER.replay if there are several."""
+
+    episodes: int = 1
+    """How many of each level."""
+
+    seed: int = 0
+    """Of the first one's start; the others follow."""
+
+    slips: float = 0.0
+    """Share of the time in which it holds any keys at all, from which it then has to recover."""
+
+    physics: str = "default"
+    """Preset to play with."""
+
+
+def main(arguments: Arguments) -> int:
+    """Do what the command line says; return the exit status, 1 if an episode did not end well."""
+    failed = 0
+    for source in arguments.levels or shipped_levels():
+        level = load_level(source)
+        numbers = range(arguments.seed, arguments.seed + arguments.episodes)
+        for seed in tqdm(numbers, desc=level.name, unit=" episodes"):
+            failed += not demonstrate(level, seed, arguments)
+    if failed:
+        print(f"{failed} did not reach the finish", file=sys.stderr)
+    # Recovering from slips does not always succeed, and need not.
+    return 1 if failed and arguments.slips == 0.0 else 0
+
+
+def demonstrate(level: Level, seed: int, arguments: Arguments) -> bool:
+    """Play an episode; return whether it reached the finish, and only then keep it."""
+    config = EnvConfig(level=level, physics=arguments.physics, num_threads=1)
+    player = ScriptedPlayer(level, slips=arguments.slips, seed=seed)
+    replay = record_episode(config, player, seed=seed, player="scripted player")
+    result = replay.result
+    told = (
+        f"{result.outcome}, {result.coins} coins ({result.score_percent:.0f} %), "
+        f"{result.time_s:.2f} s"
+    )
+    if not result.success:
+        tqdm.write(f"{level.name}, seed {seed}: {told}; not kept")
+        return False
+    name = level.name if arguments.episodes == 1 else f"{level.name}-{seed}"
+    file = save_replay(replay, arguments.output / f"{name}.replay")
+    tqdm.write(f"{file}: {told}, {file.stat().st_size} bytes, {verify(load_replay(file))}")
+    return True
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(tyro.cli(Arguments, description=__doc__)))
+    except (LevelError, ValueError) as error:
+        sys.exit(f"error: {error}")

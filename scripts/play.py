@@ -1,0 +1,145 @@
+"""Play the game in a browser page, in a window, or watch a trained agent play.
+
+Examples::
+
+    python scripts/play.py
+    python scripts/play.py --level bridge --skip-intro
+    python scripts/play.py --policy runs/ppo_classic-seed0
+    python scripts/play.py --level my_level.yaml --physics accurate --viewer native
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from roller_env.config import EnvConfig
+from roller_env.play.app import GamePlugin, ScreenPlugin, level_choices
+from roller_env.play.scene import Quality
+from roller_env.play.server import (
+    DEFAULT_PORT,
+    LOOPBACK,
+    NATIVE_NOTE,
+    open_page,
+    open_window,
+    run,
+    warning_of,
+)
+from roller_env.play.session import GameSession, Player, play_config
+from roller_env.play.sound import CoinSound
+from roller_env.replay.keeper import ReplayKeeper
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """Play the game, or watch a trained agent play it."""
+
+    level: str | None = None
+    """Name of a level, or path of a level file; by default classic, or the agent's own."""
+
+    port: int = DEFAULT_PORT
+    """Where the page is served; 0 takes the first free port from 8080."""
+
+    host: str = LOOPBACK
+    """Address to listen on. By default only this machine reaches the page."""
+
+    viewer: Literal["web", "native"] = "web"
+    """A page in the browser, or a window (Python 3.12 or newer)."""
+
+    quality: Quality = "high"
+    """low is for machines that draw without a graphics processor."""
+
+    physics: str | None = None
+    """fast, default or accurate; by default default, or that of the agent's evaluation."""
+
+    skip_intro: bool = False
+    """Let the keys work at once, not six seconds after the start."""
+
+    seed: int | None = None
+    """Of the first game; by default another one every time."""
+
+    policy: Path | None = None
+    """A run's directory: its agent plays until you press a key."""
+
+    replays: Path | None = None
+    """Directory for a replay of every game; scripts/replay.py verifies, shows and films them."""
+
+    record: str | None = None
+    """Prefix of Minari data sets of what was played, one a level, such as roller/human."""
+
+    mute: bool = False
+    """No sound."""
+
+
+def main(arguments: Arguments) -> None:
+    """Do what the command line says."""
+    config, agent = game_of(arguments)
+    keeper = ReplayKeeper(arguments.replays, "human" if agent is None else "agent and human")
+    choices = level_choices(config.level)
+    sound = CoinSound(muted=arguments.mute)
+    if sound.silent_because and not arguments.mute:
+        print(f"no sound: {sound.silent_because}")
+    sessions = session_maker(config, agent, arguments, keeper)
+    game = GamePlugin(sessions, choices, sound, arguments.quality)
+    plugins = (game, ScreenPlugin(choices))
+    if arguments.viewer == "native":
+        handle = open_window(plugins)
+        print(NATIVE_NOTE)
+    else:
+        if warning := warning_of(arguments.host):
+            print(warning, file=sys.stderr)
+        handle = open_page(plugins, port=arguments.port, host=arguments.host)
+    run(handle)
+    write_record(keeper, arguments)
+
+
+def write_record(keeper: ReplayKeeper, arguments: Arguments) -> None:
+    """Say where the replays are, and write the data sets that were asked for."""
+    for file in keeper.files:
+        print(f"replay: {file}")
+    if arguments.record is not None:
+        # Imported here: it needs the extra 'demos'.
+        from roller_env.replay.datasets import to_minari_by_level
+
+        for name in to_minari_by_level(keeper.replays, arguments.record):
+            print(f"data set: {name}")
+
+
+def game_of(arguments: Arguments) -> tuple[EnvConfig, Player | None]:
+    """Return the options of the game, and the agent that plays it, if one does."""
+    if arguments.policy is None:
+        physics = arguments.physics or "default"
+        return play_config(arguments.level or "classic", physics), None
+    # Imported here: it takes torch, which a person's game does not need.
+    from roller_env.play.autopilot import load_autopilot
+
+    return load_autopilot(arguments.policy, arguments.level, arguments.physics)
+
+
+def session_maker(
+    config: EnvConfig, agent: Player | None, arguments: Arguments, keeper: ReplayKeeper
+) -> Callable[[str], GameSession]:
+    """Return what makes the game of a level."""
+
+    def make(level: str) -> GameSession:
+        return GameSession(
+            replace(config, level=level),
+            skip_intro=arguments.skip_intro,
+            seed=arguments.seed,
+            agent=agent,
+            observers=(keeper,),
+        )
+
+    return make
+
+
+if __name__ == "__main__":
+    try:
+        main(tyro.cli(Arguments, description=__doc__))
+    except (RuntimeError, ValueError) as error:
+        sys.exit(f"error: {error}")

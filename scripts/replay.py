@@ -1,0 +1,122 @@
+"""Verify a replay bit for bit, show it in the browser, or render it.
+
+Examples::
+
+    python scripts/replay.py assets/replays/classic.replay
+    python scripts/replay.py classic --show
+    python scripts/replay.py mine.replay --video mine.mp4 --sheet mine.png
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from roller_env.drawing.opengl import DrawingUnavailable
+from roller_env.game.cameras import MODES
+from roller_env.replay import Replay, ReplayError, load_replay, shipped_replays, verify
+from roller_env.replay.pictures import contact_sheet, film
+
+_SHEET_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
+_VIDEO_SUFFIXES = (".mp4", ".gif")
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """Verify a replay bit for bit, which is what happens without an option, show or render it."""
+
+    file: Annotated[str, tyro.conf.Positional]
+    """A replay file, or the name of a level whose shipped demonstration to take."""
+
+    verify: bool = False
+    """Play it again and compare every step, also when it is rendered."""
+
+    show: bool = False
+    """Show it on a page in the browser, with a time line to drag."""
+
+    port: int = 8080
+    """Where the page is served, to this machine only; 0 takes the first free port from 8080."""
+
+    quality: Literal["high", "low"] = "high"
+    """Of the page; low is for machines that draw without a graphics processor."""
+
+    video: Path | None = None
+    """Film it, to an .mp4 or a .gif."""
+
+    sheet: Path | None = None
+    """Draw moments of it on one sheet, a .png."""
+
+    camera: Literal["game"] | int = "game"
+    """As the game's triggers set it, or a mode 0 to 5 for good."""
+
+    size: tuple[int, int] = (480, 320)
+    """Width and height of the pictures in pixels, both even."""
+
+
+def main(arguments: Arguments) -> int:
+    """Do what the command line says; return the exit status, 1 for a replay that is not exact."""
+    _check(arguments)
+    shipped = shipped_replays()
+    if arguments.file not in shipped and not Path(arguments.file).exists():
+        known = ", ".join(shipped)
+        raise ReplayError(f"{arguments.file}: there is no such file; shipped are {known}")
+    replay = load_replay(shipped.get(arguments.file, Path(arguments.file)))
+    print(_about(replay))
+    status = 0
+    if arguments.verify or not (arguments.show or arguments.video or arguments.sheet):
+        verification = verify(replay)
+        print(verification)
+        status = 0 if verification.is_exact else 1
+    if arguments.video is not None:
+        print(f"written to {film(replay, arguments.video, arguments.camera, arguments.size)}")
+    if arguments.sheet is not None:
+        print(
+            f"written to {contact_sheet(replay, arguments.sheet, arguments.camera, arguments.size)}"
+        )
+    if arguments.show:
+        _show(replay, arguments)
+    return status
+
+
+def _show(replay: Replay, arguments: Arguments) -> None:
+    # Imported here: the rest needs no viewer.
+    from roller_env.play.replay_page import replay_plugins
+    from roller_env.play.server import open_page, run
+    from roller_env.play.sound import CoinSound
+
+    plugins = replay_plugins(replay, CoinSound(muted=False), arguments.quality)
+    run(open_page(plugins, port=arguments.port))
+
+
+def _check(arguments: Arguments) -> None:
+    """Refuse what could not be written, before anything is played."""
+    for path, suffixes in (
+        (arguments.video, _VIDEO_SUFFIXES),
+        (arguments.sheet, _SHEET_SUFFIXES),
+    ):
+        if path is not None and path.suffix.lower() not in suffixes:
+            raise ReplayError(f"{path}: the name must end in {' or '.join(suffixes)}")
+    if arguments.camera != "game" and arguments.camera not in range(len(MODES)):
+        raise ReplayError(f"camera: found {arguments.camera}; allowed are game and 0 to 5")
+    if any(edge % 2 or not 16 <= edge <= 4096 for edge in arguments.size):
+        raise ReplayError(f"size: found {arguments.size}; must be even numbers from 16 to 4096")
+
+
+def _about(replay: Replay) -> str:
+    result = replay.result
+    return (
+        f"{replay.level.name}: {replay.player or 'unknown player'}, {len(replay)} steps, "
+        f"{result.time_s:.2f} s, {result.outcome}, {result.coins} coins "
+        f"({result.score_percent:.0f} %)"
+    )
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(tyro.cli(Arguments, description=__doc__)))
+    except (ReplayError, DrawingUnavailable) as error:
+        sys.exit(f"error: {error}")

@@ -1,0 +1,149 @@
+"""The page, in a real browser: what a person sees and can do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from roller_env.play.session import Phase
+from tests.play.stand import (
+    MIDDLE,
+    PANEL,
+    POINTS,
+    SCENE,
+    WATCHED_BALL,
+    Browser,
+    Stand,
+    dark,
+    differing,
+    gold,
+)
+
+
+@pytest.fixture(scope="module")
+def person(chromium: Any, stand: Stand) -> Iterator[Browser]:
+    browser = Browser(chromium, stand)
+    yield browser
+    browser.close()
+
+
+@pytest.fixture
+def page(person: Browser, stand: Stand) -> Browser:
+    """The person's page with a new game, the ball at rest."""
+    before = stand.status
+    waits = before.phase is Phase.START
+    person.press(
+        "Enter" if waits else "r",
+        "a new game begins",
+        lambda: stand.status.phase is Phase.PLAYING and (waits or is_later(stand, before.episode)),
+    )
+    return person
+
+
+def is_later(stand: Stand, episode: int) -> bool:
+    """Say whether a later episode is played."""
+    return stand.status.episode > episode
+
+
+def test_the_start_panel_waits_for_enter(person: Browser, stand: Stand) -> None:
+    assert stand.status.phase is Phase.START
+    person.wait("the panel is there", lambda: dark(person.picture()[PANEL]) > 0.9)
+    person.press("Enter", "the game begins", lambda: stand.status.phase is Phase.PLAYING)
+    person.wait("the panel is gone", lambda: dark(person.picture()[PANEL]) < 0.1)
+
+
+def test_the_picture_moves_while_w_is_held(page: Browser, stand: Stand) -> None:
+    before = page.settled()[SCENE]
+    page.press("w", "the ball has moved", lambda: stand.status.ball_x > 1.0)
+    page.wait_for_change("the picture changes", before, SCENE)
+
+
+@pytest.mark.parametrize("key", ["w", "ArrowUp"])
+def test_the_ball_is_pushed_forward_while_the_key_is_down_and_not_after(
+    page: Browser, stand: Stand, key: str
+) -> None:
+    assert stand.status.ball_x == pytest.approx(0.0, abs=0.01)
+    page.keyboard.down(key)
+    page.wait("the ball moves forward", lambda: stand.status.ball_x > 0.2)
+    assert stand.status.pushed
+    page.keyboard.up(key)
+    page.wait("the push ends", lambda: not stand.status.pushed)
+    x = stand.status.ball_x
+    page.wait("the ball rolls on by itself", lambda: stand.status.ball_x > x + 0.2)
+
+
+def test_keys_are_let_go_when_the_page_loses_the_focus(page: Browser, stand: Stand) -> None:
+    page.keyboard.down("w")
+    page.wait("the ball is pushed", lambda: stand.status.pushed)
+    page.page.evaluate("window.dispatchEvent(new Event('blur'))")
+    page.wait("the push ends", lambda: not stand.status.pushed)
+    page.page.evaluate("window.dispatchEvent(new Event('focus'))")
+    page.keyboard.up("w")
+
+
+def test_the_points_panel_counts_a_coin(page: Browser, stand: Stand) -> None:
+    nothing = gold(page.settled()[POINTS])
+    assert stand.status.coins == 0
+    page.press("w", "the coin is collected", lambda: stand.status.coins == 1)
+    # A one is written with less ink than a nought.
+    page.wait("the number changes", lambda: gold(page.picture()[POINTS]) < 0.95 * nothing)
+    page.press("r", "a new game begins", lambda: stand.status.coins == 0)
+    page.wait("it is nought again", lambda: gold(page.picture()[POINTS]) > 0.95 * nothing)
+
+
+def test_the_finish_shows_the_end_panel_and_enter_plays_again(page: Browser, stand: Stand) -> None:
+    page.press("w", "the finish is reached", lambda: stand.status.phase is Phase.ENDED)
+    assert stand.status.success
+    page.wait("the end panel is there", lambda: dark(page.picture()[PANEL]) > 0.9)
+    page.press("Enter", "a new game begins", lambda: stand.status.phase is Phase.PLAYING)
+    page.wait("the panel is gone", lambda: dark(page.picture()[PANEL]) < 0.1)
+
+
+def test_r_puts_the_ball_back_to_the_start(page: Browser, stand: Stand) -> None:
+    page.press("w", "the ball has moved", lambda: stand.status.ball_x > 0.5)
+    page.press("r", "it is back", lambda: abs(stand.status.ball_x) < 0.01)
+    assert stand.status.phase is Phase.PLAYING
+
+
+def test_p_pauses_and_escape_goes_on(page: Browser, stand: Stand) -> None:
+    page.press("p", "time stands still", lambda: stand.status.phase is Phase.PAUSED)
+    page.press("Escape", "time goes on", lambda: stand.status.phase is Phase.PLAYING)
+
+
+def test_c_changes_the_camera(page: Browser, stand: Stand) -> None:
+    before, mode = page.settled()[SCENE], stand.status.camera
+    page.press("c", "the mode changes", lambda: stand.status.camera != mode)
+    page.wait_for_change("the picture is another", before, SCENE, share=0.2)
+
+
+def test_neither_the_mouse_nor_keys_of_studio_change_the_view(page: Browser, stand: Stand) -> None:
+    before = page.settled()[MIDDLE]
+    page.page.mouse.move(210, 200)
+    page.page.mouse.down()
+    page.page.mouse.move(330, 240, steps=5)
+    for key in ("Space", "Backspace", "F1", "F2", "Tab", "q", "e", "["):
+        page.keyboard.press(key, delay=150)
+    after = page.settled()[MIDDLE]
+    page.page.mouse.up()
+    assert differing(after, before) < 0.05
+    assert stand.status.phase is Phase.PLAYING
+
+
+def test_a_second_browser_watches_and_cannot_steer(
+    page: Browser, stand: Stand, chromium: Any
+) -> None:
+    guest = Browser(chromium, stand, controls=False)
+    try:
+        before, episode = guest.settled()[WATCHED_BALL], stand.status.episode
+        guest.keyboard.down("s")
+        guest.keyboard.press("r", delay=500)
+        assert not stand.status.pushed
+        page.press("w", "the ball has moved", lambda: stand.status.ball_x > 1.0)
+        page.wait("the push ends", lambda: not stand.status.pushed)
+        guest.keyboard.up("s")
+        guest.wait_for_change("the guest sees the ball leave", before, WATCHED_BALL, share=0.3)
+        assert stand.status.episode == episode
+    finally:
+        guest.close()

@@ -1,0 +1,99 @@
+"""A Minari data set of replays holds what its environment gives, and says which that is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from roller_env.config import make_config
+from roller_env.game.rewards import RewardWeights
+from roller_env.physics.presets import PhysicsPreset
+from roller_env.replay.datasets import environment_spec, to_minari, to_minari_by_level
+from tests.builders import make_level
+from tests.replay.recording import straight_on, wandered
+
+minari = pytest.importorskip("minari", reason="the extra 'demos' is not installed")
+
+# That the data set asks for this package, which a checkout on the path does not install.
+pytestmark = pytest.mark.filterwarnings("ignore:Package roller-env is not installed:UserWarning")
+
+
+@pytest.fixture(autouse=True)
+def _here_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep data sets in the test's own directory."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+
+
+@pytest.mark.parametrize("observation", ["state", "dict"])
+def test_the_environment_that_a_data_set_names_gives_it_again(observation: str) -> None:
+    played = [wandered("bridge", seed=seed, reward="shaped") for seed in (3, 4)]
+    to_minari(played, "roller/bridge/test-v0", author="a test", observation=observation)
+    data_set = minari.load_dataset("roller/bridge/test-v0")
+    assert data_set.total_episodes == 2
+    assert data_set.total_steps == sum(map(len, played))
+    environment = data_set.recover_environment()
+    for replay, episode in zip(played, data_set.iterate_episodes(), strict=True):
+        seen, _ = environment.reset(seed=replay.seed)
+        total = 0.0
+        for step, action in enumerate(episode.actions):
+            assert _same(seen, episode.observations, step)
+            seen, reward, terminated, truncated, _ = environment.step(action)
+            assert (reward, terminated) == (episode.rewards[step], episode.terminations[step])
+            assert truncated == episode.truncations[step]
+            total += reward
+        assert _same(seen, episode.observations, len(episode.actions))
+        assert total == replay.result.total_reward
+
+
+def _same(seen: Any, observations: Any, step: int) -> bool:
+    if isinstance(seen, dict):
+        return all(_same(seen[name], observations[name], step) for name in seen)
+    return bool(np.array_equal(seen, observations[step]))
+
+
+def test_an_episode_that_was_left_is_cut_off_at_its_end() -> None:
+    data_set = to_minari([straight_on("gate", 10, physics="fast")], "roller/gate/left-v0")
+    (episode,) = data_set.iterate_episodes()
+    assert episode.truncations.tolist() == 9 * [False] + [True]
+    assert not episode.terminations.any()
+
+
+def test_a_data_set_is_of_one_game() -> None:
+    with pytest.raises(ValueError, match="different levels or options"):
+        to_minari([wandered("flat"), wandered("bridge")], "roller/both-v0")
+    with pytest.raises(ValueError, match="found none"):
+        to_minari([], "roller/none-v0")
+
+
+def test_a_data_set_is_not_overwritten() -> None:
+    to_minari([wandered("flat")], "roller/flat/once-v0")
+    with pytest.raises(ValueError, match="already exists"):
+        to_minari([wandered("flat")], "roller/flat/once-v0")
+
+
+def test_what_was_played_on_several_levels_becomes_a_data_set_of_each() -> None:
+    nothing = straight_on("gate", 0, physics="fast")
+    played = [wandered("flat"), nothing, wandered("bridge"), wandered("flat", seed=1)]
+    assert to_minari_by_level(played, "roller/human") == [
+        "roller/human/flat-v0",
+        "roller/human/bridge-v0",
+    ]
+    assert minari.load_dataset("roller/human/flat-v0").total_episodes == 2
+    assert to_minari_by_level(played[:1], "roller/human") == ["roller/human/flat-v1"]
+
+
+def test_an_environment_is_named_only_where_that_says_all_of_it() -> None:
+    spec = environment_spec(make_config(level="gate", physics="fast", reward="shaped"))
+    assert spec is not None
+    assert spec.id == "Roller/Gate-v0"
+    assert spec.kwargs["physics"] == "fast"
+    for options in (
+        {"level": make_level()},
+        {"level": make_level(name="gate")},
+        {"level": "gate", "physics": PhysicsPreset("fast", dt_s=1 / 60)},
+        {"level": "gate", "reward_weights": RewardWeights(coin=2.0)},
+    ):
+        assert environment_spec(make_config(**options)) is None

@@ -1,0 +1,118 @@
+"""What is computed from a replay is what the environment gave, to the bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roller_env.envs.single import RollerEnv
+from roller_env.game.actions import DIRECTIONS, forces
+from roller_env.game.rules import INTRO_S
+from roller_env.replay import ReplayError, record_episode
+from roller_env.replay.experience import actions_of, experiences
+from tests.replay.recording import pushed_otherwise, straight_on, wandered
+
+
+def equal(one: Any, other: Any) -> bool:
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(equal(one[name], other[name]) for name in one)
+    return bool(np.array_equal(one, other))
+
+
+@pytest.mark.parametrize("observation", ["state", "rays", "dict"])
+@pytest.mark.parametrize("action", ["directions", "keys", "force"])
+def test_an_environment_given_the_actions_gives_the_same_again(
+    observation: str, action: str
+) -> None:
+    options = {"observation": observation, "action": action, "reward": "shaped"}
+    played = wandered("bridge", seed=11)
+    (experience,) = experiences([played], **options)
+    environment = RollerEnv(level="bridge", physics="fast", **options)
+    seen, _ = environment.reset(seed=11)
+    for step in range(len(experience)):
+        assert equal(seen, _at(experience.observations, step))
+        seen, reward, terminated, truncated, _ = environment.step(experience.actions[step])
+        assert reward == experience.rewards[step]
+        assert terminated == experience.terminated[step]
+        assert truncated == experience.truncated[step]
+    assert equal(seen, _at(experience.observations, len(experience)))
+    assert experience.terminated[-1]
+    assert len(experience) == len(played)
+
+
+def _at(observations: Any, step: int) -> Any:
+    if isinstance(observations, dict):
+        return {name: values[step] for name, values in observations.items()}
+    return observations[step]
+
+
+def test_replays_of_all_lengths_and_levels_keep_their_order() -> None:
+    played = [wandered(level, seed=seed) for seed in (1, 2) for level in ("bridge", "flat")]
+    together = experiences(played)
+    for replay, experience in zip(played, together, strict=True):
+        (alone,) = experiences([replay])
+        assert experience.replay is replay
+        assert len(experience) == len(replay)
+        assert equal(experience.observations, alone.observations)
+        assert np.array_equal(experience.rewards, alone.rewards)
+
+
+def test_there_is_nothing_to_learn_from_the_intro() -> None:
+    played = wandered("flat", intro=True, max_episode_steps=200)
+    (experience,) = experiences([played])
+    assert len(played) - len(experience) == round(INTRO_S / played.options.control_dt_s)
+    assert len(experience.observations) == len(experience) + 1
+    assert experience.rewards.sum() == played.result.total_reward
+
+
+def test_an_episode_that_was_left_before_its_end_has_none() -> None:
+    (experience,) = experiences([straight_on("gate", 10, physics="fast")])
+    assert not experience.terminated.any()
+    assert not experience.truncated.any()
+
+
+def test_a_replay_that_is_not_exact_here_teaches_nothing() -> None:
+    with pytest.raises(ReplayError, match=r"1 of 1 replays .* part at step 6"):
+        experiences([pushed_otherwise(wandered("flat"), 5)])
+
+
+@pytest.mark.parametrize("option", ["physics", "control_dt_s", "level"])
+def test_the_game_itself_is_the_replays_own(option: str) -> None:
+    with pytest.raises(ValueError, match=f"{option}: these are the replay's own"):
+        experiences([wandered("flat")], **{option: "fast"})
+
+
+def test_pictures_are_not_made_again() -> None:
+    with pytest.raises(ValueError, match="choose state, rays or dict"):
+        experiences([wandered("flat")], observation="pixels")
+
+
+@given(st.lists(st.integers(0, len(DIRECTIONS) - 1), max_size=20))
+def test_directions_follow_from_forces(actions: list[int]) -> None:
+    pushed = forces("directions", np.array(actions, dtype=np.int64))
+    assert actions_of("directions", pushed).tolist() == actions
+    for mode in ("keys", "force"):
+        assert np.array_equal(forces(mode, actions_of(mode, pushed)), pushed)
+
+
+@given(st.lists(st.tuples(*(2 * [st.floats(-1.0, 1.0, width=32)])), max_size=20))
+def test_forces_follow_from_forces(pushes: list[tuple[float, float]]) -> None:
+    actions = np.array(pushes, dtype=np.float32).reshape(-1, 2)
+    pushed = forces("force", actions)
+    assert np.array_equal(actions_of("force", pushed), actions)
+
+
+def test_a_force_that_no_key_makes_is_no_action_of_keys() -> None:
+    played = wandered("flat")
+    weaker = record_episode(played.config(), lambda _: np.array([[2.0, 0.0]]), seed=0)
+    for mode in ("directions", "keys"):
+        with pytest.raises(ReplayError, match=f"step 0, .* is no action of mode '{mode}'"):
+            experiences([weaker], action=mode)
+    with pytest.raises(ReplayError, match="no action of mode 'force'"):
+        actions_of("force", np.array([[1e3, 0.0]]))
+    assert replace(weaker, player="x").player == "x"

@@ -1,0 +1,285 @@
+"""A replay file is read back exactly, and no file, however made, does anything but be refused."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import json
+import os
+import pickle
+import tracemalloc
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from roller_env.level import load_level, shipped_levels
+from roller_env.replay import Replay, ReplayError, load_replay, save_replay
+from roller_env.replay import file as replay_file
+from roller_env.replay.contents import MAX_PHYSICS_STEPS, MAX_STEPS, canonical_text
+from roller_env.replay.file import MAX_HEADER_BYTES, decode, encode
+from tests.replay.recording import same, straight_on, wandered
+
+PLAYED = straight_on("gate", 12, physics="fast")
+CONTENT = encode(PLAYED)
+PLAIN = gzip.decompress(CONTENT)
+MEMORY_BYTES = 16 * 2**20
+"""Many times what the small files here hold, and a small part of what they claim to."""
+
+
+def unpacked() -> tuple[dict[str, Any], bytes]:
+    """Return the header and the rest of a file."""
+    line, _, body = gzip.decompress(CONTENT).partition(b"\n")
+    return json.loads(line), body
+
+
+def packed(header: Any, body: bytes) -> bytes:
+    return gzip.compress(json.dumps(header).encode() + b"\n" + body, mtime=0)
+
+
+def changed(change: Callable[[dict[str, Any]], None]) -> bytes:
+    """Return a file whose header was changed by somebody who knows the format."""
+    header, body = unpacked()
+    change(header)
+    return packed(header, body)
+
+
+def refusal(content: bytes) -> str:
+    """Return why a file is refused, and see that it is done in one line and little memory."""
+    tracemalloc.start()
+    try:
+        with pytest.raises(ReplayError) as refused:
+            decode(content)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < MEMORY_BYTES
+    message = str(refused.value)
+    assert message
+    assert "\n" not in message
+    return message
+
+
+def read_or_refused(content: bytes) -> tuple[Replay | None, str]:
+    """Return a file's replay, or why it is refused, in one line."""
+    try:
+        return decode(content), ""
+    except ReplayError as error:
+        message = str(error)
+    assert "\n" not in message
+    return None, message
+
+
+@pytest.mark.parametrize("level", shipped_levels())
+def test_what_was_written_is_read_to_the_bit(level: str, tmp_path: Path) -> None:
+    played = wandered(level, reward="shaped", max_episode_steps=100)
+    file = save_replay(played, tmp_path / "new" / "game.replay")
+    again = load_replay(file)
+    assert same(played, again)
+    assert encode(again) == file.read_bytes()
+    assert again.level == load_level(level)
+    assert again.level_hash == played.level_hash
+
+
+@given(
+    st.lists(st.tuples(*(2 * [st.floats(allow_nan=False, allow_infinity=False)])), max_size=40),
+    st.integers(0, 2**128 - 1) | st.none(),
+    st.text(max_size=200),
+)
+def test_any_forces_are_kept_to_the_bit(
+    forces: list[tuple[float, float]], seed: int | None, player: str
+) -> None:
+    force = np.array(forces, dtype=np.float64).reshape(-1, 2)
+    checksums = np.arange(len(force) + 1, dtype=np.uint32) * 0x9E3779B1
+    try:
+        text = player.encode()
+    except UnicodeEncodeError:
+        text = b""
+    played = replace(PLAYED, force_n=force, checksums=checksums, seed=seed, player=text.decode())
+    assert same(decode(encode(played)), played)
+
+
+def test_a_file_tells_what_it_is_without_this_package() -> None:
+    header, body = unpacked()
+    assert (header["kind"], header["format"], header["steps"]) == ("roller-replay", 1, 12)
+    assert json.loads(body.partition(b"\n")[0])["name"] == "gate"
+
+
+@given(st.integers(0, len(CONTENT) - 1))
+def test_a_file_cut_short_is_refused(length: int) -> None:
+    refusal(CONTENT[:length])
+
+
+@given(st.integers(0, len(CONTENT) - 1), st.integers(0, 7))
+def test_a_flipped_bit_is_noticed_or_changes_nothing(place: int, bit: int) -> None:
+    damaged = bytearray(CONTENT)
+    damaged[place] ^= 1 << bit
+    read, why = read_or_refused(bytes(damaged))
+    # Gzip's header holds a time and a system that nothing depends on.
+    assert why if read is None else place < 10 and same(read, PLAYED)
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, len(PLAIN) - 1), st.integers(1, 255)), min_size=1, max_size=4)
+)
+def test_any_bytes_changed_before_it_was_packed_are_refused_or_read(
+    changes: list[tuple[int, int]],
+) -> None:
+    content = bytearray(PLAIN)
+    for place, change in changes:
+        content[place] ^= change
+    read, why = read_or_refused(gzip.compress(bytes(content)))
+    assert why or read is not None
+
+
+@given(st.binary(max_size=500), st.sampled_from([b"", b"\x1f\x8b", b"\x1f\x8b\x08\x00" + bytes(6)]))
+def test_any_bytes_are_refused(content: bytes, begin: bytes) -> None:
+    refusal(begin + content)
+
+
+@given(st.binary(max_size=300))
+def test_any_bytes_inside_gzip_are_refused(content: bytes) -> None:
+    refusal(gzip.compress(content))
+    refusal(gzip.compress(content + b"\n" + content))
+
+
+@given(
+    st.recursive(
+        st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=10),
+        lambda inner: (
+            st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=6), inner, max_size=4)
+        ),
+        max_leaves=6,
+    ),
+    st.sampled_from(sorted(unpacked()[0])),
+)
+def test_a_header_with_anything_in_a_field_is_refused_or_read(value: Any, field: str) -> None:
+    header, body = unpacked()
+    read, why = read_or_refused(packed(header | {field: value}, body))
+    assert why if read is None else value in (header[field], getattr(read, field))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda h: h.update(steps=2**62), "steps"),
+        (lambda h: h.update(steps=MAX_STEPS), "longer or shorter"),
+        (lambda h: h.update(steps=-1), "steps"),
+        (lambda h: h.update(steps=12.0), "steps"),
+        (lambda h: h.update(steps="12"), "steps"),
+        (lambda h: h.update(level_bytes=2**40), "level_bytes"),
+        (lambda h: h.update(level_bytes=h["level_bytes"] - 16), "longer or shorter"),
+        (lambda h: h.update(level_bytes=h["level_bytes"] - 16, steps=13), "longer or shorter"),
+        (lambda h: h.update(level_sha256="0" * 64), "does not match its hash"),
+        (lambda h: h.update(format=2), "found format 2; this version of Roller reads format 1"),
+        (lambda h: h.update(kind="pickle"), "not a replay"),
+        (lambda h: h.update(start=[1e6, 0.0, 0.0]), "the ball starts at"),
+        (lambda h: h.update(start=[0.0, 0.0, 99.0]), "the ball starts at"),
+        (lambda h: h["options"]["physics"].update(dt_s=1e-300), "dt_s"),
+        (lambda h: h["options"]["physics"].update(iterations=10**9), "iterations"),
+        (lambda h: h["options"]["physics"].update(integrator="../x"), "integrator"),
+        (lambda h: h["options"]["physics"].update(impratio=-1.0), "impratio"),
+        (lambda h: h["options"].update(control_dt_s=0.051), "no multiple"),
+        (lambda h: h["options"].update(action="__import__"), "action"),
+        (lambda h: h["options"].update(level="/etc/passwd"), "level"),
+        (lambda h: h["options"]["reward_weights"].update(coin=1e999), "weights"),
+        (lambda h: h.update(player="x" * 201), "player"),
+        (lambda h: h.update(more=1), "more"),
+        (lambda h: h.pop("intro"), "intro"),
+    ],
+)
+def test_a_header_that_lies_is_refused_with_the_field_it_lies_in(
+    change: Callable[[dict[str, Any]], None], message: str
+) -> None:
+    assert message in refusal(changed(change))
+
+
+def test_a_file_that_swells_when_it_is_unpacked_is_refused_before_it_does() -> None:
+    header, body = unpacked()
+    swollen = packed(header, body + bytes(200 * 2**20))
+    assert len(swollen) < 2**20
+    assert "longer or shorter" in refusal(swollen)
+    assert "header" in refusal(gzip.compress(b" " * 100 * 2**20))
+    assert "not a replay" in refusal(gzip.compress(b"[" * (MAX_HEADER_BYTES - 2) + b"\n"))
+
+
+def test_what_follows_the_replay_is_refused() -> None:
+    assert "longer or shorter" in refusal(CONTENT + b"x")
+    assert "longer or shorter" in refusal(CONTENT + CONTENT)
+
+
+def test_a_level_that_is_none_is_refused_though_its_hash_is_right() -> None:
+    level = PLAYED.level
+    for wrong, message in (
+        ("{}", "its level is wrong: name"),
+        ("[" * 100_000, "its level is wrong"),
+        (canonical_text(level).replace('"gate"', '"/tmp/../x"', 1), "its level is wrong: name"),
+        (canonical_text(level).replace('"opens":["gate"]', '"opens":["gaet"]'), "gaet"),
+    ):
+        played = replace(PLAYED)
+        played.__dict__["level_text"] = wrong
+        assert message in refusal(encode(played))
+
+
+def test_a_game_that_would_take_days_is_refused() -> None:
+    steps = MAX_PHYSICS_STEPS // 6 + 1
+    with pytest.raises(ReplayError, match="too long a replay"):
+        replace(
+            PLAYED,
+            force_n=np.zeros((steps, 2)),
+            checksums=np.zeros(steps + 1, dtype=np.uint32),
+        )
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_forces_that_are_no_numbers_are_refused(wrong: float) -> None:
+    header, body = unpacked()
+    at = header["level_bytes"] + 1
+    force = np.array([wrong]).astype("<f8").tobytes()
+    assert "finite" in refusal(packed(header, body[:at] + force + body[at + 8 :]))
+
+
+def test_nothing_is_unpickled(tmp_path: Path) -> None:
+    class Harm:
+        def __reduce__(self) -> tuple[Any, ...]:
+            return os.mkdir, (str(tmp_path / "harm"),)
+
+    archive = io.BytesIO()
+    np.savez(archive, header=np.array([Harm()], dtype=object))
+    zipped = io.BytesIO()
+    with zipfile.ZipFile(zipped, "w") as container:
+        container.writestr("../../outside", b"x")
+    for content in (pickle.dumps(Harm()), archive.getvalue(), zipped.getvalue()):
+        assert "not a replay" in refusal(content)
+        assert "not a replay" in refusal(gzip.compress(content))
+    assert not (tmp_path / "harm").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [("nothing", "no such file"), (".", "not a file"), ("pipe", "not a file"), ("a\0b", "no such")],
+)
+def test_what_is_no_file_is_said_to_be_none(tmp_path: Path, name: str, message: str) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ReplayError, match=message):
+        load_replay(tmp_path / name)
+
+
+def test_a_file_too_large_is_not_read_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = save_replay(PLAYED, tmp_path / "game.replay")
+    monkeypatch.setattr(replay_file, "_MAX_BYTES", len(CONTENT) - 1)
+    with pytest.raises(ReplayError, match=r"game\.replay: too large; allowed are at most"):
+        load_replay(file)
+
+
+def test_a_name_too_long_is_refused_before_it_is_written() -> None:
+    with pytest.raises(ReplayError, match="found 201 characters"):
+        replace(PLAYED, player=201 * "x")

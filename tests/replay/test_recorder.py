@@ -1,0 +1,183 @@
+"""What was played is played again, bit for bit, whoever played it and wherever."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+
+from roller_env.envs.single import RollerEnv
+from roller_env.envs.vector import RollerVectorEnv
+from roller_env.game.actions import forces
+from roller_env.game.rules import INTRO_S
+from roller_env.level import shipped_levels
+from roller_env.replay import Recorder, replays_of, verify
+from tests.builders import make_level
+from tests.replay.recording import same, straight_on, wandered
+from tests.simulation.driving import simulation_of, wandering
+
+
+@pytest.mark.parametrize("level", shipped_levels())
+@pytest.mark.parametrize("reward", ["points", "shaped"])
+def test_a_game_of_any_level_is_the_same_when_played_again(level: str, reward: str) -> None:
+    played = wandered(level, reward=reward, max_episode_steps=300)
+    verification = verify(played)
+    assert verification.is_exact, verification
+    assert verification.result.total_reward == played.result.total_reward
+    assert len(played) > 20
+
+
+@pytest.mark.parametrize("physics", ["default", "accurate"])
+@pytest.mark.parametrize("action", ["keys", "force"])
+def test_any_preset_and_any_force_are_on_record(physics: str, action: str) -> None:
+    rng = np.random.default_rng(1)
+    simulation = simulation_of("gate", physics=physics, action=action, num_threads=1)
+    recorder = Recorder(simulation)
+    recorder.begin()
+    for _ in range(60):
+        force = rng.uniform(-5.0, 5.0, (1, 2))
+        recorder.record(force, simulation.step(force).reward)
+    played = recorder.replay()
+    assert verify(played).is_exact
+    assert played.result.outcome == "not ended"
+    assert played.options.physics.name == physics
+
+
+def test_every_row_and_every_episode_of_many_games_is_played_again_alone() -> None:
+    simulation = simulation_of("bridge", num_envs=7, seed=3, num_threads=2, physics="fast")
+    recorder = Recorder(simulation)
+    rows = np.array([0, 2, 6])
+    recorder.begin(rows)
+    pushes = wandering(7, seed=5)
+    kept = []
+    for _ in range(400):
+        force = next(pushes)
+        recorder.record(force, simulation.step(force).reward)
+        over = np.flatnonzero(simulation.state.over)
+        kept += [recorder.replay(row) for row in np.intersect1d(over, rows)]
+        simulation.reset(over)
+        recorder.begin(np.intersect1d(over, rows))
+    assert len(kept) > 2 * len(rows)
+    assert len({played.start for played in kept}) == len(kept)
+    for played in kept:
+        assert verify(played).is_exact
+        assert played.result.fall
+
+
+def test_rows_held_back_are_not_on_record_for_that_step() -> None:
+    simulation = simulation_of("flat", num_envs=2, num_threads=1, physics="fast")
+    recorder = Recorder(simulation)
+    recorder.begin([0, 1])
+    for step in range(20):
+        force = forces("directions", [1, 2])
+        hold = np.array([step % 2 == 0, False])
+        recorder.record(force, simulation.step(force, hold=hold).reward)
+    assert [len(recorder.replay(row)) for row in (0, 1)] == [10, 20]
+    assert all(verify(recorder.replay(row)).is_exact for row in (0, 1))
+
+
+def test_the_intro_is_on_record() -> None:
+    played = wandered("flat", intro=True, max_episode_steps=200)
+    assert played.intro
+    assert verify(played).is_exact
+    begin = round(INTRO_S / played.options.control_dt_s)
+    assert np.abs(played.force_n[: begin - 1]).max() > 0.0
+    assert not wandered("flat").intro
+
+
+def test_an_environment_is_recorded_from_outside() -> None:
+    environment = RollerEnv(level="flat", physics="fast")
+    environment.reset(seed=4)
+    recorder = Recorder(environment.simulation, player="a test")
+    recorder.begin(seed=4)
+    over, total = False, 0.0
+    while not over:
+        _, reward, terminated, truncated, info = environment.step(1)
+        recorder.record(forces("directions", [1]), np.array([reward]))
+        over, total = terminated or truncated, total + reward
+    played = recorder.replay()
+    assert verify(played).is_exact
+    assert (played.seed, played.player) == (4, "a test")
+    assert (played.result.coins, played.result.success) == (info["coins"], info["success"])
+    assert played.result.total_reward == total
+
+
+def test_a_vector_environment_that_resets_in_the_next_step_is_recorded_from_outside() -> None:
+    environment = RollerVectorEnv(
+        3, level="flat", physics="fast", autoreset_mode=AutoresetMode.NEXT_STEP
+    )
+    environment.reset(seed=0)
+    recorder = Recorder(environment.simulation)
+    recorder.begin([1])
+    over = np.zeros(3, dtype=bool)
+    kept = []
+    for _ in range(260):
+        _, reward, terminated, truncated, _ = environment.step(np.array([0, 1, 5]))
+        if over[1]:
+            recorder.begin([1])
+        else:
+            recorder.record(forces("directions", [0, 1, 5]), reward)
+        over = terminated | truncated
+        if over[1]:
+            kept.append(recorder.replay(1))
+    assert len(kept) > 1
+    assert all(verify(played).is_exact for played in kept)
+
+
+def test_games_of_which_starts_and_forces_were_kept_become_the_replays_they_would_have_been() -> (
+    None
+):
+    played = [wandered("bridge", seed=seed) for seed in range(4)]
+    again = replays_of(
+        played[0].config(),
+        np.array([one.start for one in played]),
+        [one.force_n for one in played],
+        player="at random",
+        seeds=[one.seed for one in played],
+    )
+    assert len({len(one) for one in played}) > 1
+    assert all(same(one, other) for one, other in zip(played, again, strict=True))
+
+
+def test_no_games_are_no_replays() -> None:
+    assert replays_of(wandered().config(), np.zeros((0, 3)), []) == []
+
+
+def test_a_game_whose_physics_fails_is_on_record_to_its_end() -> None:
+    level = make_level(gravity=0.001, ball={"mass_kg": 0.001}, time_limit_s=20.0)
+    simulation = simulation_of(level, num_threads=1, action="force")
+    recorder = Recorder(simulation)
+    recorder.begin()
+    for force in np.zeros((1, 2)), np.full((1, 2), 1e30):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            recorder.record(force, simulation.step(force).reward)
+    assert "diverged" in str(caught[-1].message)
+    played = recorder.replay()
+    assert played.result.diverged
+    assert len(played) == 2
+    with pytest.warns(RuntimeWarning, match="diverged"):
+        assert verify(played).is_exact
+
+
+def test_a_recording_begins_at_a_beginning() -> None:
+    simulation = simulation_of("flat", num_envs=3, physics="fast")
+    simulation.step(np.zeros((3, 2)))
+    simulation.reset(np.array([1]))
+    with pytest.raises(ValueError, match=r"found \[0, 2\] under way"):
+        Recorder(simulation).begin([0, 1, 2])
+    Recorder(simulation).begin([1])
+
+
+def test_a_step_that_the_recorder_was_not_told_of_is_noticed() -> None:
+    simulation = simulation_of("flat", physics="fast")
+    recorder = Recorder(simulation)
+    recorder.begin()
+    force = np.zeros((1, 2))
+    simulation.step(force)
+    with pytest.raises(ValueError, match="found it at step 2 after 0 recorded"):
+        recorder.record(force, simulation.step(force).reward)
+    played = straight_on("flat", 5, physics="fast")
+    assert len(played) == 5
