@@ -11,15 +11,17 @@ ARGS   ?=
 
 VENV   := .venv
 BIN    := $(VENV)/bin
+# Other environments, to be measured beside this one; never mixed with what Roller needs.
+PEERS  := .venv-peers
 # Newer than both files it depends on exactly when the environment is complete.
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup train play test lint format clean
+.PHONY: help setup train play test lint format benchmark clean
 .DELETE_ON_ERROR:
 
 help: ## show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' Makefile
 	@echo
 	@echo "  make train LEVEL=$(LEVEL) SEED=1"
 	@echo "  make train CONFIG=my.yaml NAME=mine ARGS=\"--set ppo.gamma=0.995\""
@@ -60,6 +62,15 @@ format: $(READY) ## let ruff format the code and mend what it can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-clean: ## remove .venv and caches; runs/ stays
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+benchmark: $(READY) $(PEERS)/.ready ## measure against physics alone and other environments
+	@$(BIN)/python scripts/benchmark.py $(ARGS)
+
+$(PEERS)/.ready: scripts/benchmark-peers.txt
+	@echo "Installing the other environments into $(PEERS) (once) ..."
+	@test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
+	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-input -r $<
+	@touch $@
+
+clean: ## remove the environments and caches; runs/ stays
+	rm -rf $(VENV) $(PEERS) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

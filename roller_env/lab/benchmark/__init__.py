@@ -1,0 +1,5 @@
+"""How fast the environments are: against physics alone, against other environments, and at scale.
+
+`ratios` races contestants side by side, `breakdown` says where the time goes, and `scale` how cost
+and memory grow.
+"""

@@ -1,0 +1,86 @@
+"""Other environments as contestants, each in an interpreter of the peers' own environment."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import tempfile
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Final, Self
+
+from roller_env.lab.benchmark.race import Contestant
+
+INTERPRETER: Final = Path(".venv-peers/bin/python")
+"""Where ``make benchmark`` puts the peers."""
+
+_WORKER: Final = Path(__file__).with_name("peer_worker.py")
+
+
+class PeerError(RuntimeError):
+    """A peer's environment is there but does not work."""
+
+
+class Peer(Contestant):
+    """An environment of `peer_worker`, stepped over a pipe; the pipe's time is not counted.
+
+    Attributes:
+        versions: of the packages that it is made of.
+    """
+
+    def __init__(self, name: str, interpreter: Path, **wanted: Any) -> None:
+        """Start the worker.
+
+        Args:
+            name: what tables call it.
+            interpreter: Python of an environment that has the peers.
+            wanted: ``peer`` is a key of `peer_worker.PEERS`; the others are its arguments.
+
+        Raises:
+            PeerError: the worker did not come up.
+        """
+        self._complaints = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 - __exit__
+        self._process = subprocess.Popen(
+            [interpreter, str(_WORKER), json.dumps(wanted)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._complaints,
+            text=True,
+        )
+        facts = self._answer(name)
+        self.versions: dict[str, str] = facts["versions"]
+        super().__init__(name, facts["env_steps"], facts["simulated_s"])
+
+    def __enter__(self) -> Self:
+        """Return the peer."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """End the worker, which stops when its input does."""
+        self._process.communicate()
+        self._complaints.close()
+
+    def _run(self, steps: int) -> float:
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps({"steps": steps}) + "\n")
+        self._process.stdin.flush()
+        return float(self._answer(self.name)["seconds"])
+
+    def _answer(self, name: str) -> dict[str, Any]:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            self._process.wait()
+            self._complaints.seek(0)
+            last = self._complaints.read().strip().splitlines()[-1:]
+            raise PeerError(
+                f"{name}: the worker ended with code {self._process.returncode}: "
+                f"{' '.join(last) or 'no message'}"
+            )
+        answer: dict[str, Any] = json.loads(line)
+        return answer
