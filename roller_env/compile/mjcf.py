@@ -33,7 +33,7 @@ SERVO_FREQUENCY: Final = 200.0
 """Natural frequency of the plates' and gates' servos, rad/s. They trail their set-point by
 2 speed / frequency (8 mm for a gate) and implicitfast is stable up to dt = 4.8 / frequency."""
 
-SERVO_G: Final = 100.0
+SERVO_G: Final = 10.0
 """Most force of a servo over the weight of what it moves, in standard gravities. Ample for keeping
 its speed with the ball on it; without a limit a gate that closes on the ball shoots it away at
 50 m/s, since nothing rigid gives way (``scripts/stability.py``, gate_closing_on_the_ball)."""

@@ -356,9 +356,8 @@ HARD_CASES: Final[dict[str, HardCase]] = {
             "a hanging gate comes down on the ball until it is shut",
             _gate_coming_down,
             _read_gate,
-            "no shipped level has a hanging gate; the servo has no limit of force, and the stiffer "
-            "a preset's contacts the harder the ball is shot out. A limit of 1 kN cures it: see "
-            "the failure 'crush'",
+            "no shipped level has a hanging gate; what keeps the ball from being shot out is the "
+            "limit of the servo's force: see the failure 'crush'",
         ),
         HardCase(
             "riding_a_sinking_gate",
