@@ -205,10 +205,11 @@ def _read_header(line: bytes) -> _Header:
         facts: Any = from_json(line)
         if not isinstance(facts, dict) or facts.get("kind") != _KIND:
             raise ReplayError("not a replay: it does not begin with a replay's header")
-        if facts.get("format") != FORMAT_VERSION:
-            found = str(facts.get("format"))[:20]
+        found = facts.get("format")
+        # True is equal to 1.
+        if isinstance(found, bool) or found != FORMAT_VERSION:
             raise ReplayError(
-                f"found format {found}; this version of Roller reads format {FORMAT_VERSION}"
+                f"found format {str(found)[:20]}; this version of Roller reads format {FORMAT_VERSION}"
             )
         return _Header.model_validate_json(line)
     except ValidationError as error:

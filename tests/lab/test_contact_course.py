@@ -20,7 +20,7 @@ from roller_env.lab.contact.course import (
 )
 from roller_env.lab.contact.scene import ContactScene
 from roller_env.lab.experiment import Measure
-from roller_env.lab.methods import MUJOCO, MujocoMethod
+from roller_env.lab.methods import MUJOCO, MujocoMethod, without_warnings
 
 GameSceneType = TypeVar("GameSceneType", bound=GameScene)
 
@@ -62,7 +62,12 @@ def test_before_any_impact_the_euler_family_is_ahead_by_h_over_t_and_rk4_is_exac
 def test_the_servo_takes_each_integrator_as_far_as_predicted() -> None:
     """Frequency 200 rad/s, ratio 1: Euler to .83 / 200 = 4.1 ms, implicitfast to 24 ms."""
     push = until(GATE_PUSH, 1.0)
-    assert not push.trial(MujocoMethod("Euler"), 0.005).errors()["position"] < push.failure
+    unlimited = push.trial(MujocoMethod("Euler"), 0.005)
+    unlimited.model.actuator_forcelimited[:] = 0
+    with without_warnings():
+        assert not unlimited.errors()["position"] < push.failure
+    # The game's servos have a limit of force, which keeps the blow-up small.
+    assert push.trial(MujocoMethod("Euler"), 0.005).errors()["position"] < 0.01
     for method in (MujocoMethod("Euler"), MujocoMethod("implicitfast"), MujocoMethod("RK4")):
         assert push.trial(method, 0.002).errors()["position"] < 0.01
     assert push.trial(MujocoMethod("implicitfast"), 0.005).errors()["position"] < 0.01

@@ -51,14 +51,18 @@ def test_a_soft_bounce_that_has_ended_is_refused() -> None:
 
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
 def test_mujoco_approaches_its_contacts_own_law(integrator: str) -> None:
-    """To first order, RK4 too: no method looks for the moment of the impact."""
+    """To first order, RK4 too: no method looks for the moment of the impact.
+
+    How far off one run is depends on where in a step the ball arrives, so several are averaged.
+    """
     method = MujocoMethod(integrator)  # type: ignore[arg-type]
+    steps = np.array([0.002, 0.0016, 0.00125, 0.001, 0.0008])
     coarse, fine = (
-        np.mean([BOUNCE.trial(method, dt_s).errors()["position"] for dt_s in steps])
-        for steps in ((0.002, 0.001), (2e-4, 1e-4))
+        np.mean([BOUNCE.trial(method, float(dt_s)).errors()["position"] for dt_s in some])
+        for some in (steps, steps / 10.0)
     )
-    assert fine < 1e-3
-    assert coarse / 20.0 < fine < coarse / 3.0
+    assert fine < 2e-3
+    assert coarse / 20.0 < fine < coarse / 5.0
 
 
 def test_a_spring_throws_eulers_ball_above_the_drop_beyond_the_predicted_step() -> None:

@@ -82,8 +82,9 @@ def test_the_soft_contact_throws_the_ball_up_beyond_the_predicted_step() -> None
 def test_the_elliptic_cone_lets_a_skid_last_as_long_at_every_heading(
     skid: Skid, method: MujocoMethod
 ) -> None:
+    """To two steps of 1 ms in .29 s: it is a step at whose end the slip is gone."""
     errors = skid.trial(method, 0.001).errors()
-    assert errors["roll_time"] < 0.005
+    assert errors["roll_time"] < 2.0 * 0.001 / 0.29
     assert errors["heading"] < 1e-6
 
 

@@ -83,11 +83,24 @@ def test_a_method_that_errs_too_much_is_reported_as_failed() -> None:
 
 
 def test_a_simulation_that_diverges_is_reported_as_failed_with_no_number() -> None:
-    """Euler takes the servo's damping to 4.1 ms."""
+    """Euler takes the damping of a servo whose force has no limit to 4.1 ms."""
+    scene = SCENES["gate-push"]
+    trial = scene.trial(MujocoMethod("Euler"), 0.02)
+    trial.model.actuator_forcelimited[:] = 0
     with without_warnings():
-        points = measure(SCENES["gate-push"], MujocoMethod("Euler"), 0.02, repeats=1)
-    assert len(points) == len(SCENES["gate-push"].measures)
-    assert all(point.failed and math.isnan(point.error) for point in points)
+        errors = trial.errors()
+    assert set(errors) == {one.name for one in scene.measures}
+    assert all(math.isnan(error) for error in errors.values())
+
+
+def test_an_error_beyond_the_scenes_limit_is_a_failure() -> None:
+    with without_warnings():
+        far, near = (
+            measure(SCENES["bounce"], MujocoMethod("Euler"), dt_s, repeats=1)[0]
+            for dt_s in (0.02, 0.001)
+        )
+    assert far.failed
+    assert not near.failed
 
 
 def test_the_rigid_body_is_refused_by_name() -> None:

@@ -192,9 +192,11 @@ def test_mujocos_rk4_is_munthe_kaas_in_body_axes() -> None:
 @given(states(boxes(3)))
 def test_momentum_form_and_velocity_form_convert_both_ways(state: State) -> None:
     back = from_mujoco(state.body, *to_mujoco(state))
+    # A slender body's smallest moment magnifies the rounding of the largest.
+    slenderness = (state.body.inertia.max(axis=1) / state.body.inertia.min(axis=1)).max()
     for name in ("position", "momentum", "angular_momentum", "angular_velocity"):
         value = getattr(state, name)
-        slack = 1e-14 * (1.0 + np.abs(value).max())
+        slack = 1e-14 * slenderness * (1.0 + np.abs(value).max())
         np.testing.assert_allclose(getattr(back, name), value, rtol=1e-12, atol=slack)
     assert float(quaternion.angle_between(state.rotation, back.rotation).max()) < 1e-15
 
