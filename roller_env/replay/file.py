@@ -209,7 +209,8 @@ def _read_header(line: bytes) -> _Header:
         # True is equal to 1.
         if isinstance(found, bool) or found != FORMAT_VERSION:
             raise ReplayError(
-                f"found format {str(found)[:20]}; this version of Roller reads format {FORMAT_VERSION}"
+                f"found format {str(found)[:20]}; this version of Roller reads format "
+                f"{FORMAT_VERSION}"
             )
         return _Header.model_validate_json(line)
     except ValidationError as error:

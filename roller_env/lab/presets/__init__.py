@@ -1,0 +1,1 @@
+"""Physics presets chosen by measurement: settings, what they get wrong, and what they cost."""

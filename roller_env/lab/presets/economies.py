@@ -1,0 +1,209 @@
+"""Model no more than the scene needs: what each thing left out, or put in, costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from roller_env.compile.mjcf import BALL, build_spec
+from roller_env.lab.benchmark.levels import level_of_boxes
+from roller_env.lab.presets.cost import Runner, costs
+from roller_env.lab.presets.setting import pair_with_ball, set_flag
+from roller_env.level import Level, load_level
+from roller_env.level.expand import coin_positions, solids
+from roller_env.physics.presets import PRESETS
+
+
+@dataclass(frozen=True, slots=True)
+class EconomyRow:
+    """One way to model the classic level, or a level of so many boxes.
+
+    Attributes:
+        what: how it is modelled.
+        chosen: whether the compiler does it so.
+        boxes: of the level of boxes; 0 for the classic level.
+        geoms: of the model.
+        us_per_step: CPU microseconds, median over the rounds.
+        spread: (largest - smallest) / median.
+        same_bits: whether the ball's way is the chosen model's, to the bit.
+    """
+
+    what: str
+    chosen: bool
+    boxes: int
+    geoms: int
+    us_per_step: float
+    spread: float
+    same_bits: bool
+
+
+Change = Callable[[mujoco.MjSpec, Level], None]
+
+
+def _as_chosen(_spec: mujoco.MjSpec, _level: Level) -> None:
+    pass
+
+
+def _flag(name: str, on: bool) -> Change:
+    def change(spec: mujoco.MjSpec, _level: Level) -> None:
+        set_flag(spec.option, name, on)
+
+    return change
+
+
+def _unmerged(spec: mujoco.MjSpec, level: Level) -> None:
+    """Have every box of the level and every cell of its floors be a geom."""
+    merged = [geom for geom in spec.geoms if geom.name.startswith("solid_")]
+    materials = {geom.name.split("_", 2)[2]: geom for geom in merged}
+    for number, solid in enumerate(solids(level)):
+        like = materials[solid.material]
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, np.array(solid.rotation).reshape(9))
+        spec.worldbody.add_geom(
+            name=f"cell_{number}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=solid.half_size,
+            pos=solid.centre,
+            quat=quaternion,
+            contype=like.contype,
+            conaffinity=like.conaffinity,
+            priority=like.priority,
+            condim=like.condim,
+            friction=like.friction,
+            solref=like.solref,
+            solimp=like.solimp,
+        )
+    for geom in merged:
+        spec.delete(geom)
+
+
+def _no_contact_bits(spec: mujoco.MjSpec, _level: Level) -> None:
+    """Let everything touch everything, as MuJoCo does unless told otherwise."""
+    for geom in spec.geoms:
+        geom.contype = geom.conaffinity = 1
+
+
+def _pairs(spec: mujoco.MjSpec, _level: Level) -> None:
+    for geom in spec.geoms:
+        if geom.name != BALL:
+            pair_with_ball(spec, geom)
+    spec.geom(BALL).contype = 0
+
+
+def _fixed_movers(spec: mujoco.MjSpec, level: Level) -> None:
+    for name in _movers(level):
+        spec.delete(spec.actuator(name))
+        spec.delete(spec.joint(name))
+
+
+def _no_movers(spec: mujoco.MjSpec, level: Level) -> None:
+    for name in _movers(level):
+        spec.delete(spec.actuator(name))
+        spec.delete(spec.body(name))
+
+
+def _movers(level: Level) -> list[str]:
+    return [*(plate.name for plate in level.plates), *(gate.name for gate in level.gates)]
+
+
+def _coins(as_geoms: bool) -> Change:
+    def change(spec: mujoco.MjSpec, level: Level) -> None:
+        radius = level.ball.radius / 2
+        for number, coin in enumerate(coin_positions(level)[0]):
+            if as_geoms:
+                spec.worldbody.add_geom(
+                    name=f"coin_{number}",
+                    type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+                    size=[radius, radius / 4, 0.0],
+                    pos=coin,
+                    contype=0,
+                    conaffinity=0,
+                )
+            else:
+                spec.worldbody.add_site(name=f"coin_{number}", size=[radius] * 3, pos=coin)
+
+    return change
+
+
+def _cells(spec: mujoco.MjSpec, level: Level) -> None:
+    """Leave floors unmerged, with what the compiler does for levels of so many geoms."""
+    _unmerged(spec, level)
+    set_flag(spec.option, "midphase", True)
+    set_flag(spec.option, "sleep", True)
+
+
+AS_CHOSEN: Final = "as compiled"
+CLASSIC: Final[dict[str, Change]] = {
+    AS_CHOSEN: _as_chosen,
+    "every floor cell a geom": _cells,
+    "no contact bits: all may touch all": _no_contact_bits,
+    "explicit pairs instead of contact bits": _pairs,
+    "coins as geoms": _coins(as_geoms=True),
+    "coins as sites": _coins(as_geoms=False),
+    "constraint islands on": _flag("island", True),
+    "midphase on": _flag("midphase", True),
+    "fixed geoms posed once (sleep)": _flag("sleep", True),
+    "plate and gate without joints": _fixed_movers,
+    "no plate, no gate": _no_movers,
+}
+"""Ways to model the classic level."""
+
+
+def _plain(spec: mujoco.MjSpec, _level: Level) -> None:
+    set_flag(spec.option, "sleep", False)
+    set_flag(spec.option, "midphase", False)
+
+
+_SIZES: Final[dict[str, Change]] = {
+    AS_CHOSEN: _as_chosen,
+    "fixed geoms posed every step": _flag("sleep", False),
+    "neither midphase nor posed once": _plain,
+}
+"""Ways to model levels of many boxes."""
+
+
+def measure(rounds: int, boxes: Sequence[int], games: int) -> list[EconomyRow]:
+    """Measure every way to model the classic level, and levels of more and more boxes.
+
+    Args:
+        rounds: turns over which costs are medians.
+        boxes: sizes of the levels.
+        games: that are stepped together.
+    """
+    rows = _rows(load_level("classic"), CLASSIC, 0, rounds, games)
+    for count in boxes:
+        rows += _rows(level_of_boxes(count), _SIZES, count, rounds, games)
+    return rows
+
+
+def _rows(
+    level: Level, changes: Mapping[str, Change], boxes: int, rounds: int, games: int
+) -> list[EconomyRow]:
+    models = {what: _model(level, change) for what, change in changes.items()}
+    runners = {what: Runner(model, level.start.at, games) for what, model in models.items()}
+    taken = costs(runners, rounds)
+    ball = runners[AS_CHOSEN].ball
+    return [
+        EconomyRow(
+            what=what,
+            chosen=what == AS_CHOSEN,
+            boxes=boxes,
+            geoms=models[what].ngeom,
+            us_per_step=taken[what].us_per_step,
+            spread=taken[what].spread,
+            same_bits=bool(np.array_equal(runners[what].ball, ball)),
+        )
+        for what in changes
+    ]
+
+
+def _model(level: Level, change: Change) -> mujoco.MjModel:
+    spec = build_spec(level, PRESETS["default"])
+    change(spec, level)
+    model = spec.compile()
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    return model

@@ -1,0 +1,114 @@
+"""A physics setting: a preset and the further knobs of MuJoCo that are tried on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import mujoco
+
+from roller_env.compile.compiled import CompiledLevel, compile_level
+from roller_env.compile.mjcf import BALL, build_spec
+from roller_env.level import Level
+from roller_env.physics.presets import PRESETS, PhysicsPreset
+
+Option = float | int | str
+_ENUMS: Final[dict[str, tuple[type, str]]] = {
+    "solver": (mujoco.mjtSolver, "mjSOL_"),
+    "integrator": (mujoco.mjtIntegrator, "mjINT_"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """How the game's levels are simulated.
+
+    Attributes:
+        name: what tables and charts call it.
+        knob: what it is about; settings of one knob form a group.
+        preset: the settings that the product can be given.
+        options: further fields of MuJoCo's ``mjOption``, by name; enumerations by MuJoCo's name.
+        flags: MuJoCo's flags that differ from the compiler's, by name, and whether they are on.
+        contacts_at_s: the time step that contacts are calibrated for; None for the preset's own.
+        stiffness: factor of the rate B of the plastic contacts; the spring goes with its square.
+        impedance: of all contacts; None for the product's.
+        friction_steps: share of the slip that a step removes; makes explicit contact pairs, which
+            alone can have it differ from the share of the approach (`DAMPING_STEPS`).
+        pairs: whether the ball's contacts are explicit pairs instead of contact bits.
+    """
+
+    name: str
+    knob: str
+    preset: PhysicsPreset = PRESETS["default"]
+    options: tuple[tuple[str, Option], ...] = ()
+    flags: tuple[tuple[str, bool], ...] = ()
+    contacts_at_s: float | None = None
+    stiffness: float = 1.0
+    impedance: float | None = None
+    friction_steps: float | None = None
+    pairs: bool = False
+
+    def compile(self, level: Level) -> CompiledLevel:
+        """Return the level compiled with this setting."""
+        compiled = compile_level(level, self.preset)
+        model = self.spec(level).compile()
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+        return replace(compiled, model=model)
+
+    def spec(self, level: Level) -> mujoco.MjSpec:
+        """Return the level's MjSpec with this setting."""
+        contacts_at = self.contacts_at_s or self.preset.dt_s
+        spec = build_spec(level, replace(self.preset, dt_s=contacts_at))
+        option = spec.option
+        option.timestep = self.preset.dt_s
+        for name, value in self.options:
+            setattr(option, name, _value(name, value))
+        for name, on in self.flags:
+            set_flag(option, name, on)
+        surfaces = [geom for geom in spec.geoms if geom.name != BALL]
+        for geom in surfaces:
+            self._change_contact(geom, contacts_at)
+        if self.pairs or self.friction_steps is not None:
+            for geom in surfaces:
+                pair = pair_with_ball(spec, geom)
+                if self.friction_steps is not None:
+                    pair.solreffriction = [0.0, -self.friction_steps / self.preset.dt_s]
+            spec.geom(BALL).contype = 0
+        return spec
+
+    def _change_contact(self, geom: mujoco.MjsGeom, contacts_at: float) -> None:
+        stiffness, damping = geom.solref
+        # Plastic contacts are the only ones in which a step takes less than all of the approach.
+        if -damping * contacts_at < 1.0:
+            geom.solref = [stiffness * self.stiffness**2, damping * self.stiffness]
+        if self.impedance is not None:
+            geom.solimp = [self.impedance, self.impedance, *geom.solimp[2:]]
+
+
+def pair_with_ball(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjsPair:
+    """Add an explicit contact pair of the ball and a geom, with the geom's contact."""
+    return spec.add_pair(
+        geomname1=geom.name,
+        geomname2=BALL,
+        condim=3,
+        friction=[geom.friction[0], geom.friction[0], 0.0, 0.0, 0.0],
+        solref=list(geom.solref),
+        solimp=list(geom.solimp),
+    )
+
+
+def set_flag(option: mujoco.MjOption, name: str, on: bool) -> None:
+    """Turn one of MuJoCo's flags on or off, whichever of its two sets of flags it is in."""
+    enable = getattr(mujoco.mjtEnableBit, f"mjENBL_{name.upper()}", None)
+    if enable is not None:
+        option.enableflags = option.enableflags & ~int(enable) | (int(enable) if on else 0)
+        return
+    disable = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}"))
+    option.disableflags = option.disableflags & ~disable | (0 if on else disable)
+
+
+def _value(name: str, value: Option) -> object:
+    if name not in _ENUMS:
+        return value
+    enum, prefix = _ENUMS[name]
+    return getattr(enum, f"{prefix}{str(value).upper()}")

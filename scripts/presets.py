@@ -1,0 +1,73 @@
+"""Chart physics settings by their error and their cost: where the presets come from.
+
+Examples::
+
+    python scripts/presets.py
+    python scripts/presets.py --quick
+    python scripts/presets.py --only fast default accurate "RK4 1/480"
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from pathlib import Path
+
+import tyro
+from tqdm import tqdm
+
+from roller_env.lab.presets import economies, report
+from roller_env.lab.presets.catalogue import SETTINGS
+from roller_env.lab.presets.results import FULL, QUICK, measure
+from roller_env.lab.provenance import provenance
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """Measure physics settings: errors on the game's own scenes, and CPU time."""
+
+    quick: bool = False
+    """Few settings, a coarser converged model, costs that mean little: under 40 s."""
+
+    only: tuple[str, ...] = ()
+    """Names of settings; all of the catalogue, if none."""
+
+    out: Path = Path("runs/presets")
+    """Directory of the tables and pictures."""
+
+
+def main(arguments: Arguments) -> None:
+    """Do what the command line says."""
+    effort = QUICK if arguments.quick else FULL
+    if arguments.only:
+        effort = replace(effort, settings=_checked(arguments.only))
+    rows = measure(effort, _progress)
+    modelled = economies.measure(effort.rounds, effort.boxes, effort.games)
+    files = report.write(rows, modelled, provenance(), arguments.out)
+    print(*report.summary(rows, modelled), sep="\n")
+    print(f"{len(files)} files in {arguments.out}")
+
+
+def _checked(names: Sequence[str]) -> tuple[str, ...]:
+    for name in names:
+        if name not in SETTINGS:
+            near = get_close_matches(name, SETTINGS, n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise ValueError(f"--only: found {name!r}; allowed are {', '.join(SETTINGS)}{hint}")
+    return tuple(dict.fromkeys(names))
+
+
+def _progress(names: Sequence[str]) -> Iterable[str]:
+    with tqdm(names, unit="setting", dynamic_ncols=True) as bar:
+        for name in bar:
+            bar.set_postfix_str(name)
+            yield name
+
+
+if __name__ == "__main__":
+    try:
+        main(tyro.cli(Arguments, description=__doc__))
+    except ValueError as error:
+        sys.exit(f"presets.py: {error}")
