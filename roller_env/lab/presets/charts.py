@@ -36,10 +36,10 @@ _BEFORE, _AFTER = "#c3c9d1", "#1b998b"
 _LIMIT_PERCENT: Final = 1.0
 _SHOWN_PERCENT: Final = (0.03, 1.6)
 """Errors beyond these are drawn at them, with their figure."""
-_PLACES: Final = {"fast": (-62, -78), "default": (18, 74), "accurate": (-118, 26)}
+_PLACES: Final = {"fast": (-128, -66), "default": (46, 88), "accurate": (-74, 32)}
 """Of the presets' names, in points from their marks."""
-_ROOM: Final = (0.105, 0.052)
-"""Share of the chart's width and height that a name takes."""
+_ROOM: Final = (0.11, 0.022)
+"""Shares of the chart's width and half its height that a name takes, to the right of its mark."""
 
 
 def draw_front(rows: Sequence[SettingRow]) -> Figure:
@@ -47,7 +47,7 @@ def draw_front(rows: Sequence[SettingRow]) -> Figure:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 7.2))
         axes = figure.subplots()
-        figure.subplots_adjust(left=0.075, right=0.975, top=0.83, bottom=0.115)
+        figure.subplots_adjust(left=0.075, right=0.975, top=0.85, bottom=0.115)
         best = sorted((row for row in rows if row.front), key=lambda row: row.cpu_s_per_s)
         axes.plot(
             [1e3 * row.cpu_s_per_s for row in best],
@@ -84,7 +84,7 @@ def _mark(axes: Axes, row: SettingRow) -> None:
 
 def _name(axes: Axes, row: SettingRow) -> None:
     text = f"{row.setting}\n{100 * row.course:.2f} %, {1e3 * row.cpu_s_per_s:.2g} ms"
-    text += f"\nbreaks: {row.breaks}" if row.breaks else ""
+    text += f"\nbut: {row.breaks}" if row.breaks else ""
     axes.annotate(
         text,
         (1e3 * row.cpu_s_per_s, _percent(row)),
@@ -101,22 +101,32 @@ def _name(axes: Axes, row: SettingRow) -> None:
 def _label_others(axes: Axes, rows: Sequence[SettingRow]) -> None:
     """Write names where there is room; the crowd round ``default`` is in the table."""
     marks = {row.setting: axes.transAxes.inverted().transform(_pixels(axes, row)) for row in rows}
-    taken = [marks[name] for name in PRESETS if name in marks]
+    names: list[npt.NDArray[np.float64]] = []
     for row in sorted(rows, key=lambda one: (not one.front, not one.breaks)):
         at = marks[row.setting]
-        if row.setting in PRESETS or any(np.all(np.abs(at - other) < _ROOM) for other in taken):
-            continue
-        taken.append(at)
         beyond = 100.0 * row.course > _SHOWN_PERCENT[1]
+        in_the_way = [other - at for name, other in marks.items() if name != row.setting]
+        if row.setting in PRESETS or (
+            any(_covered(way, 0.0) for way in in_the_way) and not (beyond or row.front)
+        ):
+            continue
+        if any(_covered(other - at, -_ROOM[0]) for other in names):
+            continue
+        names.append(at)
         axes.annotate(
             f"{row.setting}: {100.0 * row.course:.0f} %" if beyond else row.setting,
             (1e3 * row.cpu_s_per_s, _percent(row)),
-            xytext=(8, -3),
+            xytext=(-4, -16) if beyond or row.front else (8, -3),
             textcoords="offset points",
             fontsize=8,
             color=FAILURE if row.breaks else "#333333",
             zorder=5,
         )
+
+
+def _covered(way: npt.NDArray[np.float64], left: float) -> bool:
+    """Say whether something ``way`` from a mark is under its name, or its name under the mark's."""
+    return bool(left <= way[0] < _ROOM[0] and abs(way[1]) < _ROOM[1])
 
 
 def _pixels(axes: Axes, row: SettingRow) -> npt.NDArray[np.float64]:
@@ -194,7 +204,7 @@ _DECADES: Final = (-3.0, 1.0)
 def draw_promises(rows: Sequence[SettingRow]) -> Figure:
     """Draw each setting's errors as shares of what the game can bear."""
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(12.0, 1.9 + 0.235 * len(rows)))
+        figure = Figure(figsize=(13.5, 1.9 + 0.235 * len(rows)))
         axes = figure.subplots()
         shares = np.array([[_share(row, one) for one in CRITERIA] for row in rows])
         with np.errstate(divide="ignore"):
@@ -216,7 +226,7 @@ def draw_promises(rows: Sequence[SettingRow]) -> Figure:
                 color="white" if share > 1.0 else "#333333",
                 fontweight="bold" if share > 1.0 else "normal",
             )
-        axes.set_xticks(range(len(CRITERIA)), [_heading(one) for one in CRITERIA], fontsize=8)
+        axes.set_xticks(range(len(CRITERIA)), [_heading(one) for one in CRITERIA], fontsize=7.5)
         axes.xaxis.tick_top()
         axes.set_yticks(range(len(rows)), [row.setting for row in rows], fontsize=8.5)
         for label in axes.get_yticklabels():
@@ -225,7 +235,7 @@ def draw_promises(rows: Sequence[SettingRow]) -> Figure:
         axes.tick_params(length=0)
         axes.spines[:].set_visible(False)
         height = figure.get_figheight()
-        figure.subplots_adjust(left=0.17, right=0.99, top=1.0 - 1.5 / height, bottom=0.3 / height)
+        figure.subplots_adjust(left=0.145, right=0.99, top=1.0 - 1.5 / height, bottom=0.3 / height)
         figure.suptitle(
             "Errors as shares of what the game can bear: more than 1 is a promise broken "
             "(cheapest setting first)",
@@ -244,10 +254,8 @@ def _share(row: SettingRow, criterion: Criterion) -> float:
 
 
 def _heading(criterion: Criterion) -> str:
-    label, _, unit = criterion.label.partition(", ")
-    unit = f" {unit}" if unit in ("mm", "°") else ""
-    lines = [*textwrap.wrap(label, 12), f"≤ {criterion.limit:.3g}{unit}"]
-    return "\n".join(lines)
+    unit = f" {criterion.unit}" if criterion.unit else ""
+    return "\n".join([*textwrap.wrap(criterion.title, 11), f"≤ {criterion.limit:.3g}{unit}"])
 
 
 def _written(share: float) -> str:
@@ -311,7 +319,7 @@ def _draw_sizes(axes: Axes, rows: Sequence[EconomyRow]) -> None:
         axes.annotate(
             f"{what}\n× {ratio:.2f} from {x[0]} to {x[-1]} boxes",
             (x[-1], y[-1]),
-            xytext=(0, 8 if what == AS_CHOSEN else -26),
+            xytext=(0, -32 if what.startswith("fixed") else 8),
             textcoords="offset points",
             ha="right",
             fontsize=8.5,

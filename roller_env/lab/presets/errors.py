@@ -504,7 +504,7 @@ class Criterion:
 
     Attributes:
         name: of the field of `Errors`.
-        label: for tables and charts.
+        label: for tables and charts; after a comma the unit.
         limit: largest bearable value.
         reason: why that.
     """
@@ -513,6 +513,16 @@ class Criterion:
     label: str
     limit: float
     reason: str
+
+    @property
+    def title(self) -> str:
+        """The label without its unit."""
+        return self.label.partition(", ")[0]
+
+    @property
+    def unit(self) -> str:
+        """Of the limit; empty for shares."""
+        return self.label.partition(", ")[2]
 
 
 _ASKED: Final = "asked of the default preset"
@@ -534,7 +544,7 @@ CRITERIA: Final = (
     Criterion("carried_mm", "depth on plate and gate, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
     Criterion("squeeze_mm", "depth under a gate, mm", 1e3 * THROUGH_M, "deeper, it falls through"),
     Criterion("lane_mm", "bump of a lane of seams, mm", 1e3 * quants(1.0), "one quant"),
-    Criterion("course", "classic course, 3 s", 0.01, "as for the path"),
+    Criterion("course", "course of classic", 0.01, "as for the path"),
 )
 """The hop of a skid has no limit here, since what cures it costs the course; see the docs."""
 

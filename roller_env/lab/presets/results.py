@@ -95,7 +95,7 @@ def rows_of(
             setting=name,
             knob=setting.knob,
             dt_s=setting.preset.dt_s,
-            breaks="; ".join(one.label for one in broken(errors[name])),
+            breaks="; ".join(one.title for one in broken(errors[name])),
             front=name in best,
         )
         for name, setting in settings.items()
