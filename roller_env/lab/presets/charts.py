@@ -36,8 +36,10 @@ _BEFORE, _AFTER = "#c3c9d1", "#1b998b"
 _LIMIT_PERCENT: Final = 1.0
 _SHOWN_PERCENT: Final = (0.03, 1.6)
 """Errors beyond these are drawn at them, with their figure."""
-_PLACES: Final = {"fast": (-128, -66), "default": (46, 88), "accurate": (-74, 32)}
+_PLACES: Final = {"fast": (-128, -104), "default": (-52, -122), "accurate": (-78, 84)}
 """Of the presets' names, in points from their marks."""
+_BELOW: Final = 0.035
+"""Share of the height by which a name stands below its mark, on the front."""
 _ROOM: Final = (0.11, 0.022)
 """Shares of the chart's width and half its height that a name takes, to the right of its mark."""
 
@@ -110,13 +112,15 @@ def _label_others(axes: Axes, rows: Sequence[SettingRow]) -> None:
             any(_covered(way, 0.0) for way in in_the_way) and not (beyond or row.front)
         ):
             continue
-        if any(_covered(other - at, -_ROOM[0]) for other in names):
+        below = beyond or row.front
+        place = at - (0.0, _BELOW) if below else at
+        if any(_covered(other - place, -_ROOM[0]) for other in names):
             continue
-        names.append(at)
+        names.append(place)
         axes.annotate(
             f"{row.setting}: {100.0 * row.course:.0f} %" if beyond else row.setting,
             (1e3 * row.cpu_s_per_s, _percent(row)),
-            xytext=(-4, -16) if beyond or row.front else (8, -3),
+            xytext=(-4, -16) if below else (8, -3),
             textcoords="offset points",
             fontsize=8,
             color=FAILURE if row.breaks else "#333333",
@@ -314,19 +318,10 @@ def _draw_sizes(axes: Axes, rows: Sequence[EconomyRow]) -> None:
         own = [row for row in rows if row.what == what]
         colour, width, marker = styles.get(what, ("#c9b27c", 1.6, "^"))
         x, y = [row.boxes for row in own], [row.us_per_step for row in own]
-        axes.plot(x, y, color=colour, linewidth=width, marker=marker)
-        ratio = y[-1] / y[0]
-        axes.annotate(
-            f"{what}\n× {ratio:.2f} from {x[0]} to {x[-1]} boxes",
-            (x[-1], y[-1]),
-            xytext=(0, -32 if what.startswith("fixed") else 8),
-            textcoords="offset points",
-            ha="right",
-            fontsize=8.5,
-            color=colour,
-            fontweight="bold" if what == AS_CHOSEN else "normal",
-        )
-    axes.set_ylim(0.0, 1.2 * max(row.us_per_step for row in rows))
+        said = f"{what}: × {y[-1] / y[0]:.2f} from {x[0]} to {x[-1]}"
+        axes.plot(x, y, color=colour, linewidth=width, marker=marker, label=said)
+    axes.legend(loc="upper left", fontsize=8)
+    axes.set_ylim(0.0, 1.35 * max(row.us_per_step for row in rows))
     axes.set_xlim(0.0, 1.04 * max(row.boxes for row in rows))
     axes.set_xlabel("boxes of the level")
     axes.set_title("The same yard, with more and more boxes", loc="left", fontsize=11)

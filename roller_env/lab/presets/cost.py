@@ -17,7 +17,7 @@ from roller_env.game.actions import KEY_FORCE_N
 from roller_env.physics.stepper import keeps_poses
 
 GAMES: Final = 64
-ROUNDS: Final = 9
+ROUNDS: Final = 15
 ROUND_S: Final = 0.25
 """Game time of one turn."""
 WARM_UP_ROUNDS: Final = 8
@@ -70,11 +70,17 @@ class Runner:
 
 
 def costs(runners: Mapping[str, Runner], rounds: int = ROUNDS) -> dict[str, Cost]:
-    """Let all take turns, and return what each costs."""
+    """Let all take turns, and return what each costs.
+
+    In another order every round: who comes after the dearest, or while the machine is slow, would
+    otherwise be the same every time.
+    """
     seconds: dict[str, list[float]] = {name: [] for name in runners}
+    order, random = list(runners), np.random.default_rng(0)
     for _ in range(rounds):
-        for name, runner in runners.items():
-            seconds[name].append(runner.turn())
+        random.shuffle(order)
+        for name in order:
+            seconds[name].append(runners[name].turn())
     return {name: _cost(runners[name], taken) for name, taken in seconds.items()}
 
 

@@ -174,30 +174,33 @@ def measure(rounds: int, boxes: Sequence[int], games: int) -> list[EconomyRow]:
         boxes: sizes of the levels.
         games: that are stepped together.
     """
-    rows = _rows(load_level("classic"), CLASSIC, 0, rounds, games)
-    for count in boxes:
-        rows += _rows(level_of_boxes(count), _SIZES, count, rounds, games)
-    return rows
+    rows = _race({0: (load_level("classic"), CLASSIC)}, rounds, games)
+    return rows + _race({count: (level_of_boxes(count), _SIZES) for count in boxes}, rounds, games)
 
 
-def _rows(
-    level: Level, changes: Mapping[str, Change], boxes: int, rounds: int, games: int
+def _race(
+    levels: Mapping[int, tuple[Level, Mapping[str, Change]]], rounds: int, games: int
 ) -> list[EconomyRow]:
-    models = {what: _model(level, change) for what, change in changes.items()}
-    runners = {what: Runner(model, level.start.at, games) for what, model in models.items()}
+    """Let every way to model each level, by the number of its boxes, take turns."""
+    models, runners = {}, {}
+    for boxes, (level, changes) in levels.items():
+        for what, change in changes.items():
+            model = _model(level, change)
+            models[boxes, what] = model
+            runners[f"{boxes} {what}"] = Runner(model, level.start.at, games)
     taken = costs(runners, rounds)
-    ball = runners[AS_CHOSEN].ball
+    balls = {boxes: runners[f"{boxes} {AS_CHOSEN}"].ball for boxes in levels}
     return [
         EconomyRow(
             what=what,
             chosen=what == AS_CHOSEN,
             boxes=boxes,
-            geoms=models[what].ngeom,
-            us_per_step=taken[what].us_per_step,
-            spread=taken[what].spread,
-            same_bits=bool(np.array_equal(runners[what].ball, ball)),
+            geoms=model.ngeom,
+            us_per_step=taken[f"{boxes} {what}"].us_per_step,
+            spread=taken[f"{boxes} {what}"].spread,
+            same_bits=bool(np.array_equal(runners[f"{boxes} {what}"].ball, balls[boxes])),
         )
-        for what in changes
+        for (boxes, what), model in models.items()
     ]
 
 
