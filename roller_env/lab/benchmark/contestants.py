@@ -19,6 +19,7 @@ from roller_env.envs.vector import RollerVectorEnv
 from roller_env.lab.benchmark.race import Contestant, Pace
 from roller_env.lab.benchmark.recording import SEED, STATE, Recorder, random_actions
 from roller_env.level import load_level
+from roller_env.physics.stepper import keeps_poses
 from roller_env.simulation import Simulation
 
 Float64 = npt.NDArray[np.float64]
@@ -82,7 +83,10 @@ class BatchAlone(Contestant):
         num_envs, simulation = leader.env_steps, leader.simulation
         self._leader = leader
         self._recorder = Recorder(num_envs, **leader.options)
-        self._batch = Batch(self._recorder.model, num_envs, simulation.config.num_threads)
+        model = self._recorder.model
+        threads = simulation.config.num_threads
+        # As the game's stepper opens it.
+        self._batch = Batch(model, num_envs, threads, persistent=keeps_poses(model))
         self._batch.state[:] = self._recorder.states
         self._control = self._batch.bind("ctrl")
         super().__init__(name, num_envs, leader.simulated_s)

@@ -14,6 +14,7 @@ horizon is short.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -76,8 +77,8 @@ class GameScene(ContactScene):
     moments_s: tuple[float, ...] = ()
     reference_step_s: float = 4e-5
 
-    def _controls(self) -> Sequence[Controlled]:
-        raise NotImplementedError
+    @abstractmethod
+    def _controls(self) -> Sequence[Controlled]: ...
 
     def _start(self, data: mujoco.MjData) -> None:
         """Put the freshly reset data where the motion begins."""
@@ -174,6 +175,8 @@ def played_controls(level: str, keys: tuple[Pressed, ...]) -> tuple[Controlled, 
         level=load_level(level), physics="accurate", control_dt_s=CONTROL_DT_S, num_threads=1
     )
     simulation = Simulation(config)
+    # Where the ball starts is drawn by lot: the same place in every process.
+    simulation.seed([np.random.default_rng(0)])
     simulation.reset()
     model = simulation.compiled.model
     data = mujoco.MjData(model)
