@@ -17,7 +17,11 @@ from typing import Annotated
 import tyro
 from tqdm import tqdm
 
-from roller_env.lab import parallel, parallel_charts, style
+from roller_env.lab import style
+from roller_env.lab.parallel import charts, names
+from roller_env.lab.parallel.differences import Remedy, Sample, Verdict
+from roller_env.lab.parallel.experiments import Settings, compare, remedies
+from roller_env.lab.parallel.scenes import BODIES, SCENES
 from roller_env.lab.provenance import header, provenance
 from roller_env.lab.tables import write_rows
 from roller_env.rigid_body import integrator
@@ -58,53 +62,51 @@ class Arguments:
     """Fly for half a second."""
 
 
-def settings_of(arguments: Arguments) -> parallel.Settings:
+def settings_of(arguments: Arguments) -> Settings:
     """Return what the command line asks for.
 
     Raises:
         ValueError: when it asks for something that does not exist or does not fit together.
     """
-    scenes = dict(parallel.SCENES)
+    scenes = dict(SCENES)
     if arguments.keys:
-        scenes["keys"] = replace(scenes["keys"], held=parallel.parsed_keys(arguments.keys))
-    names = parallel.chosen_several("scene", arguments.scene, scenes)
-    return parallel.Settings(
-        bodies=parallel.chosen_several("body", arguments.body, parallel.BODIES),
-        scenes=tuple(scenes[name] for name in names),
+        scenes["keys"] = replace(scenes["keys"], held=names.parsed_keys(arguments.keys))
+    flown = names.chosen_several("scene", arguments.scene, scenes)
+    return Settings(
+        bodies=names.chosen_several("body", arguments.body, BODIES),
+        scenes=tuple(scenes[name] for name in flown),
         ours=integrator(arguments.method),
-        mujoco=parallel.mujoco_method(arguments.integrator),
+        mujoco=names.mujoco_method(arguments.integrator),
         dt_s=arguments.dt,
         duration_s=_QUICK_S if arguments.quick else arguments.duration,
     )
 
 
-def main(settings: parallel.Settings, out: Path) -> None:
+def main(settings: Settings, out: Path) -> None:
     """Fly, write and draw."""
     facts = provenance()
     print(header(facts))
-    verdicts: list[parallel.Verdict] = []
-    samples: list[parallel.Sample] = []
-    remedies: list[parallel.Remedy] = []
+    verdicts: list[Verdict] = []
+    samples: list[Sample] = []
+    mended: list[Remedy] = []
     for body in settings.bodies:
-        summary, course = parallel.compare(settings, body)
+        summary, course = compare(settings, body)
         verdicts += summary
         samples += course
-        style.save(parallel_charts.draw_flights(settings, body, course), facts, out / body)
-    print(f"\nLargest differences between the two:\n\n{parallel_charts.verdict_table(verdicts)}")
+        style.save(charts.draw_flights(settings, body, course), facts, out / body)
+    print(f"\nLargest differences between the two:\n\n{charts.verdict_table(verdicts)}")
     write_rows(verdicts, facts, out / "verdicts")
     write_rows(samples, facts, out / "differences")
     # On a cube angular velocity is angular momentum over a number in any axes: nothing to mend.
-    for body in (name for name in settings.bodies if not parallel.BODIES[name].isotropic):
-        tried = tqdm(parallel.remedies(settings, body), f"the {body}, other methods", unit="run")
-        mended = [row for rows in tried for row in rows]
-        remedies += mended
-        style.save(
-            parallel_charts.draw_remedies(settings, body, mended), facts, out / f"{body}_remedies"
-        )
+    for body in (name for name in settings.bodies if not BODIES[name].isotropic):
+        tried = tqdm(remedies(settings, body), f"the {body}, other methods", unit="run")
+        of_body = [row for rows in tried for row in rows]
+        mended += of_body
+        style.save(charts.draw_remedies(settings, body, of_body), facts, out / f"{body}_remedies")
         print(f"\nThe {body}'s largest attitude differences from {settings.mujoco.name}:\n")
-        print(parallel_charts.remedy_table(mended))
-    if remedies:
-        write_rows(remedies, facts, out / "remedies")
+        print(charts.remedy_table(of_body))
+    if mended:
+        write_rows(mended, facts, out / "remedies")
     print(f"Tables and pictures: {out}")
 
 

@@ -5,6 +5,7 @@ Examples::
     python scripts/presets.py
     python scripts/presets.py --quick
     python scripts/presets.py --only fast default accurate "RK4 1/480"
+    python scripts/presets.py --docs docs
 """
 
 from __future__ import annotations
@@ -37,9 +38,14 @@ class Arguments:
     out: Path = Path("runs/presets")
     """Directory of the tables and pictures."""
 
+    docs: Path | None = None
+    """Documentation whose presets.md and pictures are brought up to date; full runs only."""
+
 
 def main(arguments: Arguments) -> None:
     """Do what the command line says."""
+    if arguments.docs and (arguments.quick or arguments.only):
+        raise ValueError("--docs: publishes all settings; leave out --quick and --only")
     effort = QUICK if arguments.quick else FULL
     if arguments.only:
         effort = replace(effort, settings=_checked(arguments.only))
@@ -48,6 +54,8 @@ def main(arguments: Arguments) -> None:
     files = report.write(rows, modelled, provenance(), arguments.out)
     print(*report.summary(rows, modelled), sep="\n")
     print(f"{len(files)} files in {arguments.out}")
+    if arguments.docs:
+        print("brought up to date:", *report.publish(arguments.out, arguments.docs))
 
 
 def _checked(names: Sequence[str]) -> tuple[str, ...]:

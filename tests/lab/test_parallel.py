@@ -16,25 +16,20 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from roller_env.lab import parallel
 from roller_env.lab.methods import MujocoMethod
-from roller_env.lab.parallel import (
-    AGREEMENT,
-    BODIES,
+from roller_env.lab.parallel import names
+from roller_env.lab.parallel.differences import AGREEMENT, Remedy, Verdict
+from roller_env.lab.parallel.experiments import Settings, compare
+from roller_env.lab.parallel.motions import (
     REFERENCE_ERROR,
-    SCENES,
-    EulerEquations,
-    Remedy,
-    Settings,
-    Verdict,
-    compare,
-    from_mujoco,
     mujoco_model,
     mujocos,
     ours,
     reference,
-    to_mujoco,
+    sampled_steps,
 )
+from roller_env.lab.parallel.scenes import BODIES, SCENES, FlightScene
+from roller_env.lab.parallel.velocity_form import EulerEquations, from_mujoco, to_mujoco
 from roller_env.rigid_body import LIE_RK4, RK4, SPLITTING4, Body, Integrator, State, quaternion
 from roller_env.rigid_body.arrays import Float64, cross
 from tests.rigid_body.bodies import EXAMPLES, boxes, states
@@ -120,7 +115,7 @@ def test_the_boxs_position_agrees_all_the_same(box: dict[str, Verdict], scene: s
 def remedy(scene: str, method: Integrator, dt_s: float, duration_s: float) -> Remedy:
     """Return the largest attitude differences of a box's flight."""
     body, flight = BODIES["box"], SCENES[scene]
-    sampled = parallel.sampled_steps(round(duration_s / dt_s))
+    sampled = sampled_steps(round(duration_s / dt_s))
     (mine,) = ours([flight], body, method, dt_s, sampled)
     theirs = mujocos(flight, body, MUJOCO_RK4, dt_s, sampled)
     truth = reference(flight, body, sampled.astype(np.float64) * dt_s)
@@ -269,7 +264,7 @@ def conjugate(q: Sequence[Decimal]) -> list[Decimal]:
     return [q[0], *(-x for x in q[1:])]
 
 
-def attitude_in_40_digits(scene: parallel.FlightScene, body: Body, duration_s: float) -> Float64:
+def attitude_in_40_digits(scene: FlightScene, body: Body, duration_s: float) -> Float64:
     """Return the orientation after a flight, (1, 4), by Taylor series of Euler's equations.
 
     L' = L x w - c w + R^T torque and q' = q w / 2 in body axes; all terms are products, so a
@@ -350,12 +345,12 @@ def test_the_references_position_stands_up_to_exact_fractions(body: str) -> None
 
 def test_a_name_that_does_not_exist_is_refused_with_the_nearest_that_does() -> None:
     with pytest.raises(ValueError, match=r"no scene 'balistic': .* did you mean 'ballistic'"):
-        parallel.chosen_several("scene", "balistic", SCENES)
+        names.chosen_several("scene", "balistic", SCENES)
     with pytest.raises(ValueError, match=r"no body 'boxx': .* did you mean 'box'"):
-        parallel.chosen_several("body", "boxx", BODIES)
+        names.chosen_several("body", "boxx", BODIES)
     with pytest.raises(ValueError, match=r"no MuJoCo integrator 'RK45': .* did you mean 'RK4'"):
-        parallel.mujoco_method("RK45")
-    assert parallel.chosen_several("scene", "all", SCENES) == tuple(SCENES)
+        names.mujoco_method("RK45")
+    assert names.chosen_several("scene", "all", SCENES) == tuple(SCENES)
 
 
 def test_a_step_that_straddles_a_key_or_the_end_is_refused() -> None:
@@ -374,15 +369,15 @@ def test_a_step_that_straddles_a_key_or_the_end_is_refused() -> None:
 @pytest.mark.parametrize("event", ["W", "soon=W", "=W", "nan=W"])
 def test_keys_that_cannot_be_read_are_refused(event: str) -> None:
     with pytest.raises(ValueError, match=f"keys: found '{event}'"):
-        parallel.parsed_keys([event])
+        names.parsed_keys([event])
 
 
 def test_keys_are_read_as_they_are_written() -> None:
-    keys = parallel.parsed_keys(["0=W", "1=wa", "2.5="])
+    keys = names.parsed_keys(["0=W", "1=wa", "2.5="])
     assert keys.switches_s.tolist() == [0.0, 1.0, 2.5]
     assert (keys.forces != 0.0).tolist() == [[1, 0, 0], [1, 1, 0], [0, 0, 0]]
     with pytest.raises(ValueError, match=r"unknown keys \['Q'\]"):
-        parallel.parsed_keys(["0=Q"])
+        names.parsed_keys(["0=Q"])
 
 
 def test_a_pose_of_another_shape_is_refused() -> None:

@@ -62,9 +62,12 @@ class Bounce(ContactScene):
     """A ball dropped on a spring-damper that stays the same at every step.
 
     The answer to *discretisation* is not a simulation with a small step but the contact's own law,
-    integrated from event to event (`soft_bounce`): a step that touching or letting go falls into is
-    wrong to first order with every method, RK4 included, since none of them looks for the event.
-    The *model* error is the distance from a rigid ball that loses 1 - e of its speed in no time.
+    integrated from event to event (`soft_bounce`): the step that touching falls into is wrong to
+    first order with every method, RK4 included, since none of them looks for the event. It misses
+    up to half of what the damper, which sets in at once, gives in a step (RK4: a third). So one run
+    says little about a method: its error has the luck of where in a step the ball touches, and
+    changes with anything that moves that. The *model* error is the distance from a rigid ball that
+    loses 1 - e of its speed in no time.
 
     Attributes:
         height_m: of the drop.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 from typing import Final
@@ -12,10 +13,11 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator
 
 from roller_env.lab.presets.economies import AS_CHOSEN, EconomyRow
 from roller_env.lab.presets.errors import CRITERIA, Criterion
+from roller_env.lab.presets.labels import FAR_RINGS, NEAR_RINGS, Room
 from roller_env.lab.presets.results import SettingRow
 from roller_env.lab.style import FAILURE, STYLE
 from roller_env.physics.presets import PRESETS
@@ -36,121 +38,90 @@ _BEFORE, _AFTER = "#c3c9d1", "#1b998b"
 _LIMIT_PERCENT: Final = 1.0
 _SHOWN_PERCENT: Final = (0.03, 1.6)
 """Errors beyond these are drawn at them, with their figure."""
-_PLACES: Final = {"fast": (-128, -104), "default": (-52, -122), "accurate": (-78, 84)}
-"""Of the presets' names, in points from their marks."""
-_BELOW: Final = 0.035
-"""Share of the height by which a name stands below its mark, on the front."""
-_ROOM: Final = (0.11, 0.022)
-"""Shares of the chart's width and half its height that a name takes, to the right of its mark."""
 
 
 def draw_front(rows: Sequence[SettingRow]) -> Figure:
     """Draw every setting's error on the classic course against its cost."""
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(11.0, 7.2))
+        figure = Figure(figsize=(12.0, 7.6))
         axes = figure.subplots()
-        figure.subplots_adjust(left=0.075, right=0.975, top=0.85, bottom=0.115)
-        best = sorted((row for row in rows if row.front), key=lambda row: row.cpu_s_per_s)
-        axes.plot(
-            [1e3 * row.cpu_s_per_s for row in best],
-            [_percent(row) for row in best],
-            color=_FRONT,
-            linewidth=10.0,
-            solid_capstyle="round",
-            zorder=1,
-        )
+        figure.subplots_adjust(left=0.07, right=0.98, top=0.815, bottom=0.14)
+        _frame_front(figure, axes, rows)
+        axes.plot(*np.array(_front(rows)).T, color=_FRONT, linewidth=9.0, zorder=1)
         for row in rows:
             _mark(axes, row)
-        _frame_front(figure, axes)
-        for row in rows:
-            if row.setting in PRESETS:
-                _name(axes, row)
-        _label_others(axes, rows)
         _explain(axes, rows)
+        _name_all(axes, rows)
     return figure
 
 
-def _percent(row: SettingRow) -> float:
-    return float(np.clip(100.0 * row.course, *_SHOWN_PERCENT))
+def _place(row: SettingRow) -> tuple[float, float]:
+    return 1e3 * row.cpu_s_per_s, float(np.clip(100.0 * row.course, *_SHOWN_PERCENT))
+
+
+def _front(rows: Sequence[SettingRow]) -> list[tuple[float, float]]:
+    return sorted(_place(row) for row in rows if row.front)
 
 
 def _mark(axes: Axes, row: SettingRow) -> None:
-    at, colour = ([1e3 * row.cpu_s_per_s], [_percent(row)]), KNOB_COLOURS[row.knob]
+    colour, (x, y) = KNOB_COLOURS[row.knob], _place(row)
     if row.breaks and row.setting not in PRESETS:
-        axes.plot(*at, "x", color=FAILURE, markersize=7, markeredgewidth=1.6, zorder=3)
-        axes.plot(*at, "o", markerfacecolor="none", markeredgecolor=colour, markersize=11, zorder=3)
+        axes.plot(x, y, "x", color=FAILURE, markersize=6, markeredgewidth=1.4, zorder=3)
+        axes.plot(x, y, "o", markerfacecolor="none", markeredgecolor=colour, markersize=10)
     else:
         size = 13 if row.setting in PRESETS else 7.5
-        axes.plot(*at, "o", color=colour, markersize=size, markeredgecolor="white", zorder=4)
+        axes.plot(x, y, "o", color=colour, markersize=size, markeredgecolor="white", zorder=4)
 
 
-def _name(axes: Axes, row: SettingRow) -> None:
-    text = f"{row.setting}\n{100 * row.course:.2f} %, {1e3 * row.cpu_s_per_s:.2g} ms"
-    text += f"\nbut: {row.breaks}" if row.breaks else ""
-    axes.annotate(
-        text,
-        (1e3 * row.cpu_s_per_s, _percent(row)),
-        xytext=_PLACES[row.setting],
-        textcoords="offset points",
-        fontsize=11,
-        fontweight="bold",
-        bbox={"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": "#111111"},
-        arrowprops={"arrowstyle": "-", "color": "#111111", "shrinkB": 6},
-        zorder=6,
+def _name_all(axes: Axes, rows: Sequence[SettingRow]) -> None:
+    """Write the presets' names, then those for which there is room; the table has the rest."""
+    room = Room(axes, [(_place(row), 6.0 if row.breaks else 4.5) for row in rows], _front(rows))
+    for row in rows:
+        if row.setting in PRESETS:
+            but = "\n".join(["", *textwrap.wrap(f"but: {row.breaks}", 17)]) if row.breaks else ""
+            room.write(
+                f"{row.setting}\n{100 * row.course:.2f} %, {1e3 * row.cpu_s_per_s:.2g} ms{but}",
+                _place(row),
+                FAR_RINGS,
+                fontsize=11,
+                fontweight="bold",
+                bbox={"boxstyle": "round,pad=0.35", "facecolor": "white", "edgecolor": "#111111"},
+                arrowprops={"arrowstyle": "-", "color": "#111111", "shrinkB": 6},
+            )
+    for row in sorted(rows, key=lambda one: (not one.front, -one.course)):
+        if row.setting not in PRESETS and not _like_default(row, rows):
+            beyond = 100.0 * row.course > _SHOWN_PERCENT[1]
+            room.write(
+                f"{row.setting}: {100.0 * row.course:.0f} %" if beyond else row.setting,
+                _place(row),
+                NEAR_RINGS,
+                fontsize=8,
+                color=FAILURE if row.breaks else "#333333",
+                arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.6, "shrinkB": 4},
+            )
+
+
+def _like_default(row: SettingRow, rows: Sequence[SettingRow]) -> bool:
+    """Say whether a setting changes nothing but the cost: such crowd round ``default``."""
+    errors = [one.course for one in rows if one.setting == "default"]
+    return not (row.front or row.breaks) and any(
+        math.isclose(row.course, one, rel_tol=0.01) for one in errors
     )
 
 
-def _label_others(axes: Axes, rows: Sequence[SettingRow]) -> None:
-    """Write names where there is room; the crowd round ``default`` is in the table."""
-    marks = {row.setting: axes.transAxes.inverted().transform(_pixels(axes, row)) for row in rows}
-    names: list[npt.NDArray[np.float64]] = []
-    for row in sorted(rows, key=lambda one: (not one.front, not one.breaks)):
-        at = marks[row.setting]
-        beyond = 100.0 * row.course > _SHOWN_PERCENT[1]
-        in_the_way = [other - at for name, other in marks.items() if name != row.setting]
-        if row.setting in PRESETS or (
-            any(_covered(way, 0.0) for way in in_the_way) and not (beyond or row.front)
-        ):
-            continue
-        below = beyond or row.front
-        place = at - (0.0, _BELOW) if below else at
-        if any(_covered(other - place, -_ROOM[0]) for other in names):
-            continue
-        names.append(place)
-        axes.annotate(
-            f"{row.setting}: {100.0 * row.course:.0f} %" if beyond else row.setting,
-            (1e3 * row.cpu_s_per_s, _percent(row)),
-            xytext=(-4, -16) if below else (8, -3),
-            textcoords="offset points",
-            fontsize=8,
-            color=FAILURE if row.breaks else "#333333",
-            zorder=5,
-        )
-
-
-def _covered(way: npt.NDArray[np.float64], left: float) -> bool:
-    """Say whether something ``way`` from a mark is under its name, or its name under the mark's."""
-    return bool(left <= way[0] < _ROOM[0] and abs(way[1]) < _ROOM[1])
-
-
-def _pixels(axes: Axes, row: SettingRow) -> npt.NDArray[np.float64]:
-    return np.asarray(axes.transData.transform((1e3 * row.cpu_s_per_s, _percent(row))))
-
-
-def _frame_front(figure: Figure, axes: Axes) -> None:
+def _frame_front(figure: Figure, axes: Axes, rows: Sequence[SettingRow]) -> None:
     axes.set(xscale="log", yscale="log")
-    axes.set_ylim(_SHOWN_PERCENT[0], _SHOWN_PERCENT[1] * 1.15)
-    axes.yaxis.set_minor_formatter(NullFormatter())
-    axes.xaxis.set_minor_formatter(NullFormatter())
-    axes.set_yticks([0.03, 0.1, 0.3, 1.0])
+    cost = [_place(row)[0] for row in rows]
+    axes.set_xlim(min(cost) / 1.25, max(cost) * 1.25)
+    axes.set_ylim(_SHOWN_PERCENT[0], _SHOWN_PERCENT[1] * 1.25)
     axes.set_xlabel("CPU milliseconds for a simulated second of one game (classic level, 1 thread)")
-    axes.set_ylabel(
-        "distance from the converged ball over the way, %  (classic level, 3 s of keys)"
-    )
+    axes.set_ylabel("distance from the converged ball over the way, %")
     plain = FuncFormatter(lambda value, _: f"{value:g}")
+    axes.set_yticks([0.03, 0.1, 0.3, 1.0])
+    axes.yaxis.set_major_formatter(plain)
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(plain)
-    axes.yaxis.set_major_formatter(plain)
+    axes.minorticks_off()
     axes.axhline(_LIMIT_PERCENT, color="#777777", linestyle="--", linewidth=1.2, zorder=0)
     axes.annotate(
         "promised: at most 1 %",
@@ -165,16 +136,24 @@ def _frame_front(figure: Figure, axes: Axes) -> None:
     top = axes.secondary_xaxis("top", functions=(_times_real_time, _times_real_time))
     top.set_xlabel("times real time, one thread")
     top.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    top.xaxis.set_minor_formatter(NullFormatter())
+    top.minorticks_off()
     top.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
     figure.suptitle(
         "Physics presets: what is the cheapest setting that tells the truth?",
-        x=0.075,
-        y=0.975,
+        x=0.01,
+        y=0.98,
         ha="left",
         fontsize=15,
         fontweight="bold",
     )
+    figure.text(0.01, 0.925, _FRONT_TELLS, fontsize=9, color="#555555", va="top")
+
+
+_FRONT_TELLS: Final = (
+    "Error: eight games of 3 s on the classic level, under recorded keys. A cross breaks another "
+    "of the game's promises; the front is\nof those that keep all. The nameless dots in a row with "
+    "default have its errors: flags and solver settings that change only the cost."
+)
 
 
 def _times_real_time(milliseconds: npt.ArrayLike) -> npt.NDArray[np.float64]:
@@ -182,19 +161,16 @@ def _times_real_time(milliseconds: npt.ArrayLike) -> npt.NDArray[np.float64]:
         return np.asarray(1e3 / np.asarray(milliseconds, dtype=float))
 
 
+_TIGHT: Final = {"columnspacing": 1.1, "handletextpad": 0.5, "handlelength": 1.2}
+
+
 def _explain(axes: Axes, rows: Sequence[SettingRow]) -> None:
     for knob, colour in KNOB_COLOURS.items():
         if any(row.knob == knob for row in rows):
             axes.plot([], [], "o", color=colour, label=knob)
     axes.plot([], [], "x", color=FAILURE, label="breaks a promise")
-    axes.plot([], [], color=_FRONT, linewidth=8, label="Pareto front")
-    axes.legend(
-        loc="upper right",
-        bbox_to_anchor=(1.0, 0.8),
-        ncols=2,
-        fontsize=9,
-        title="what is varied from default",
-    )
+    axes.plot([], [], color=_FRONT, linewidth=6, label="Pareto front")
+    axes.legend(loc="upper left", bbox_to_anchor=(-0.01, -0.08), ncols=11, fontsize=9, **_TIGHT)
 
 
 # The promises one by one ---------------------------------------------------------------------
@@ -208,6 +184,8 @@ _DECADES: Final = (-3.0, 1.0)
 def draw_promises(rows: Sequence[SettingRow]) -> Figure:
     """Draw each setting's errors as shares of what the game can bear."""
     with matplotlib.rc_context(STYLE):
+        presets = [row for row in rows if row.setting in PRESETS]
+        rows = [*presets, *(row for row in rows if row.setting not in PRESETS)]
         figure = Figure(figsize=(13.5, 1.9 + 0.235 * len(rows)))
         axes = figure.subplots()
         shares = np.array([[_share(row, one) for one in CRITERIA] for row in rows])
@@ -235,6 +213,7 @@ def draw_promises(rows: Sequence[SettingRow]) -> Figure:
         axes.set_yticks(range(len(rows)), [row.setting for row in rows], fontsize=8.5)
         for label in axes.get_yticklabels():
             label.set_fontweight("bold" if label.get_text() in PRESETS else "normal")
+        axes.axhline(len(presets) - 0.5, color="white", linewidth=5.0)
         axes.grid(visible=False)
         axes.tick_params(length=0)
         axes.spines[:].set_visible(False)
@@ -242,7 +221,7 @@ def draw_promises(rows: Sequence[SettingRow]) -> Figure:
         figure.subplots_adjust(left=0.145, right=0.99, top=1.0 - 1.5 / height, bottom=0.3 / height)
         figure.suptitle(
             "Errors as shares of what the game can bear: more than 1 is a promise broken "
-            "(cheapest setting first)",
+            "(presets, then all others, cheapest first)",
             x=0.01,
             y=1.0 - 0.12 / height,
             ha="left",
@@ -265,6 +244,8 @@ def _heading(criterion: Criterion) -> str:
 def _written(share: float) -> str:
     if not np.isfinite(share) or share >= 100.0:
         return ">99"
+    if math.isclose(share, 1.0, abs_tol=0.05):
+        return f"{share:.2f}" if f"{share:.2f}" != "1.00" else f"{share:.4g}"
     return "0" if share < 5e-4 else f"{share:.1g}" if share < 0.1 else f"{share:.2g}"
 
 

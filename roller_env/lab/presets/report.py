@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import shutil
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -17,7 +18,7 @@ from roller_env.physics.presets import PRESETS
 
 _TITLES: Final = (
     "setting",
-    "us a step",
+    "µs a step",
     "CPU ms per s",
     "course %",
     "path %",
@@ -28,9 +29,20 @@ _TITLES: Final = (
     "hop mm",
     "rest mm",
     "lane mm",
+    "lane %",
     "squeeze mm",
     "breaks",
 )
+
+
+_BEGIN: Final = "<!-- measured: python scripts/presets.py --docs docs -->"
+_END: Final = "<!-- end of what was measured -->"
+_PUBLISHED: Final[Mapping[str, str]] = {
+    "front": "presets.png",
+    "promises": "presets-promises.png",
+    "economies": "presets-economies.png",
+}
+"""The pictures by their name in a run and in the documentation."""
 
 
 def write(
@@ -53,14 +65,36 @@ def write(
     return [*files, page]
 
 
+def publish(out: Path, docs: Path) -> list[Path]:
+    """Put what `write` has left in ``out`` into the documentation; return the files changed.
+
+    Raises:
+        ValueError: the page has not exactly one place for the tables; nothing is changed then.
+    """
+    page = docs / "presets.md"
+    text = page.read_text(encoding="utf-8")
+    before, *rest = text.split(_BEGIN)
+    after = rest[0].partition(_END)[2] if len(rest) == 1 and rest[0].count(_END) == 1 else None
+    if after is None:
+        raise ValueError(f"{page}: must have one line {_BEGIN!r} and, after it, one {_END!r}")
+    measured = (out / "presets.md").read_text(encoding="utf-8")
+    page.write_text(f"{before}{_BEGIN}\n\n{measured}\n{_END}{after}", encoding="utf-8")
+    pictures = [docs / "images" / published for published in _PUBLISHED.values()]
+    for name, picture in zip(_PUBLISHED, pictures, strict=True):
+        shutil.copyfile(out / f"{name}.png", picture)
+    return [page, *pictures]
+
+
 def tables(rows: Sequence[SettingRow], economies: Sequence[EconomyRow]) -> str:
-    """Return the tables in Markdown, presets first."""
+    """Return the tables in Markdown, presets first and all settings folded away."""
     presets = [row for row in rows if row.setting in PRESETS]
     parts = [
         markdown(_TITLES, [_cells(row) for row in presets]),
+        f"<details><summary>All {len(rows)} settings, the cheapest first</summary>\n",
         markdown(_TITLES, [_cells(row) for row in rows]),
+        "</details>\n",
         markdown(
-            ("classic level", "geoms", "us a step", "same to the bit"),
+            ("classic level", "geoms", "µs a step", "same to the bit"),
             [
                 (row.what, row.geoms, row.us_per_step, "yes" if row.same_bits else "no")
                 for row in economies
@@ -68,7 +102,7 @@ def tables(rows: Sequence[SettingRow], economies: Sequence[EconomyRow]) -> str:
             ],
         ),
         markdown(
-            ("boxes", "modelled", "us a step", "same to the bit"),
+            ("boxes", "modelled", "µs a step", "same to the bit"),
             [
                 (row.boxes, row.what, row.us_per_step, "yes" if row.same_bits else "no")
                 for row in economies
@@ -114,6 +148,7 @@ def _cells(row: SettingRow) -> tuple[object, ...]:
         row.hop_mm,
         row.rest_mm,
         row.lane_mm,
+        100.0 * row.lane_share,
         row.squeeze_mm,
         row.breaks or "-",
     )

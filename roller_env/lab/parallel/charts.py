@@ -12,16 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from roller_env.lab import style
-from roller_env.lab.parallel import (
-    AGREEMENT,
-    REFERENCE_ERROR,
-    REMEDIES,
-    Pair,
-    Remedy,
-    Sample,
-    Settings,
-    Verdict,
-)
+from roller_env.lab.parallel.differences import AGREEMENT, Pair, Remedy, Sample, Verdict
+from roller_env.lab.parallel.experiments import Settings
+from roller_env.lab.parallel.motions import REFERENCE_ERROR
+from roller_env.lab.parallel.velocity_form import REMEDIES
 from roller_env.lab.tables import markdown
 
 PANELS: Final[Mapping[str, str]] = {
