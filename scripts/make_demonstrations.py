@@ -22,7 +22,7 @@ from tqdm import tqdm
 from roller_env.config import EnvConfig
 from roller_env.level import Level, LevelError, levels_directory, load_level, shipped_levels
 from roller_env.replay import load_replay, record_episode, save_replay, verify
-from roller_env.replay.scripted import ScriptedPlayer
+from roller_env.replay.scripted import PLAYER, ScriptedPlayer
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ def demonstrate(level: Level, seed: int, arguments: Arguments) -> bool:
     """Play an episode; return whether it reached the finish, and only then keep it."""
     config = EnvConfig(level=level, physics=arguments.physics, num_threads=1)
     player = ScriptedPlayer(level, slips=arguments.slips, seed=seed)
-    replay = record_episode(config, player, seed=seed, player="scripted player")
+    replay = record_episode(config, player, seed=seed, player=PLAYER)
     result = replay.result
     told = (
         f"{result.outcome}, {result.coins} coins ({result.score_percent:.0f} %), "

@@ -10,6 +10,7 @@ Examples::
 
 from __future__ import annotations
 
+import signal
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -32,6 +33,7 @@ from roller_env.play.server import (
 )
 from roller_env.play.session import GameSession, Player, play_config
 from roller_env.play.sound import CoinSound
+from roller_env.replay import datasets
 from roller_env.replay.keeper import ReplayKeeper
 
 
@@ -78,6 +80,11 @@ class Arguments:
 
 def main(arguments: Arguments) -> None:
     """Do what the command line says."""
+    if arguments.record is not None:
+        datasets.check_prefix(arguments.record)
+    # When its terminal is closed, the game still writes what was recorded.
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
     config, agent = game_of(arguments)
     keeper = ReplayKeeper(arguments.replays, "human" if agent is None else "agent and human")
     choices = level_choices(config.level)
@@ -103,10 +110,7 @@ def write_record(keeper: ReplayKeeper, arguments: Arguments) -> None:
     for file in keeper.files:
         print(f"replay: {file}")
     if arguments.record is not None:
-        # Imported here: it needs the extra 'demos'.
-        from roller_env.replay.datasets import to_minari_by_level
-
-        for name in to_minari_by_level(keeper.replays, arguments.record):
+        for name in datasets.to_minari_by_level(keeper.replays, arguments.record):
             print(f"data set: {name}")
 
 

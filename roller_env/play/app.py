@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple
 
 import mujoco
 import numpy as np
@@ -33,6 +33,13 @@ from roller_env.play.sound import CoinSound
 
 TICK_S: Final = 0.004
 """Pause between two looks at the clock: what it adds to the way from a key to the picture."""
+
+ANSWER_S: Final = 0.012
+"""How long a picture waits for the game when a key has gone down or up: so the key is in this
+picture and not in the next, and still there is time to draw it before 1/60 s is over."""
+
+ASK_S: Final = 0.0005
+"""Pause between two looks whether the game has answered."""
 
 KEYS_GO_STALE_S: Final = 0.25
 """Keys of which nothing was heard for so long are let go: the viewer's thread tells them 60 times
@@ -82,9 +89,15 @@ class WishEvent(messages.Event):  # type: ignore[misc]
 
 @dataclass(frozen=True, eq=False)
 class FrameSnapshot(messages.Snapshot):  # type: ignore[misc]
-    """The game as it stands."""
+    """The game as it stands.
+
+    Attributes:
+        frame: the game.
+        told_s: when the keys were told that it has heard of.
+    """
 
     frame: GameFrame
+    told_s: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +169,6 @@ class GamePlugin(plugin.SimPlugin):  # type: ignore[misc]  # MuJoCo comes withou
     @messages.handler  # type: ignore[untyped-decorator]
     def on_step(self, event: messages.StepEvent) -> bool:
         """Let the time pass that has passed, and show the result."""
-        time.sleep(TICK_S)
         now = time.monotonic()
         fresh = now - self._keys.told_s < KEYS_GO_STALE_S
         self._session.advance(now - self._looked_s, self._keys.held if fresh else NO_KEYS)
@@ -166,7 +178,9 @@ class GamePlugin(plugin.SimPlugin):  # type: ignore[misc]  # MuJoCo comes withou
             self._sound.play()
         self.latest = frame
         event.data.qpos[:] = frame.qpos()
-        self.handle.send_to_viewer(FrameSnapshot(frame))
+        self.handle.send_to_viewer(FrameSnapshot(frame, self._keys.told_s))
+        # Not before: keys that were told meanwhile are in the next step at once.
+        time.sleep(TICK_S)
         return True
 
     @messages.handler  # type: ignore[untyped-decorator]
@@ -204,8 +218,11 @@ class ScreenPlugin(plugin.ViewerPlugin):  # type: ignore[misc]
     """Keys, picture and panels, on the viewer's thread.
 
     Attributes:
+        keys_help: the keys, and what they do.
         camera: the player's.
     """
+
+    keys_help: ClassVar = panels.KEYS_HELP
 
     def __init__(self, choices: Choices) -> None:
         """Show nothing until the game sends a level.
@@ -217,6 +234,8 @@ class ScreenPlugin(plugin.ViewerPlugin):  # type: ignore[misc]
         self._choices = choices.levels
         self._scene: SceneEvent | None = None
         self._frame: GameFrame | None = None
+        self._held = NO_KEYS
+        self._answered_s = 0.0
         self._flares = Flares(np.zeros((0, 3)))
         self._shown: GameFrame | None = None
         self._fell_s = -np.inf
@@ -234,6 +253,7 @@ class ScreenPlugin(plugin.ViewerPlugin):  # type: ignore[misc]
         """Keep the game's latest frame; one of another level comes too early or too late."""
         if self._scene is not None and snapshot.frame.level is self._scene.level:
             self._frame = snapshot.frame
+        self._answered_s = snapshot.told_s
 
     @messages.handler  # type: ignore[untyped-decorator]
     def on_update(self, _: messages.UpdateEvent) -> None:
@@ -243,13 +263,16 @@ class ScreenPlugin(plugin.ViewerPlugin):  # type: ignore[misc]
             for letter, keys in _STEERING.items()
             if any(imgui.IsKeyDown(key) for key in keys)
         )
-        now = time.monotonic()
-        self.viewer.send_to_sim(KeysSnapshot(held, now))
+        told_s = time.monotonic()
+        self.viewer.send_to_sim(KeysSnapshot(held, told_s))
+        if held != self._held:
+            self._held = held
+            self._wait_for_answer(told_s)
         frame, scene = self._frame, self._scene
         if frame is None or scene is None or len(self.viewer.data.qpos) != len(frame.after):
             return
         self._notice(frame)
-        self._draw(frame, scene.scene, now)
+        self._draw(frame, scene.scene, time.monotonic())
         self._shown = frame
 
     @messages.handler  # type: ignore[untyped-decorator]
@@ -263,6 +286,13 @@ class ScreenPlugin(plugin.ViewerPlugin):  # type: ignore[misc]
         for wish in (self._wish_of_keys(), self._build_panels(self._frame, self._scene)):
             if wish is not None:
                 self.viewer.send_to_sim(WishEvent(wish))
+
+    def _wait_for_answer(self, told_s: float) -> None:
+        """Wait until the game has heard of the keys told at ``told_s``, but not for long."""
+        while self._answered_s < told_s and time.monotonic() < told_s + ANSWER_S:
+            time.sleep(ASK_S)
+            for snapshot in self.viewer.get_sim_snapshots():
+                self.viewer.dispatch(snapshot)
 
     def _notice(self, frame: GameFrame) -> None:
         """Start what begins with this frame: flares, the message of a fall."""
@@ -305,6 +335,10 @@ class ScreenPlugin(plugin.ViewerPlugin):  # type: ignore[misc]
         panels.build_hint_gui()
         if frame.agent and frame.phase is not Phase.START:
             panels.build_agent_gui(frame)
+        if self._help:
+            # In the place of the panel in the middle, which would shine through.
+            panels.build_help_gui(self.keys_help)
+            return None
         if frame.clock_s - self._fell_s < panels.FALL_MESSAGE_S:
             panels.build_fall_gui()
         wish = None
@@ -316,8 +350,6 @@ class ScreenPlugin(plugin.ViewerPlugin):  # type: ignore[misc]
             wish = panels.build_pause_gui()
         elif frame.phase is Phase.ENDED:
             wish = panels.build_end_gui(frame, self._following(scene.choice))
-        if self._help:
-            panels.build_help_gui()
         return wish
 
     def _following(self, choice: str) -> Choice | None:

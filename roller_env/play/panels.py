@@ -18,7 +18,9 @@ from roller_env.game.cameras import MODES
 from roller_env.game.rules import INTRO_S
 from roller_env.play.session import SPLASH_S, GameFrame
 
-KEYS_HELP: Final = (
+Rows = Sequence[tuple[str, str]]
+
+KEYS_HELP: Final[Rows] = (
     ("W A S D, arrows", "push the ball forward, left, back, right; two at once push diagonally"),
     ("R", "restart the level"),
     ("C", "next camera"),
@@ -83,7 +85,7 @@ class Choice:
 
 def build_points_gui(frame: GameFrame, camera_mode: int) -> None:
     """Show the points at the top left, always."""
-    with _panel("points", x=_MARGIN, y=_MARGIN):
+    with panel("points", x=_MARGIN, y=_MARGIN):
         result = frame.result
         _text(f"{result.coins} / {result.coins_in_level}", _LARGE_SIZE, _GOLD)
         detail = f"points   {result.time_s:.1f} s"
@@ -94,7 +96,7 @@ def build_points_gui(frame: GameFrame, camera_mode: int) -> None:
 
 def build_hint_gui() -> None:
     """Say at the top right where the help is."""
-    with _panel("hint", x=-_MARGIN, y=_MARGIN, pivot=(1.0, 0.0)):
+    with panel("hint", x=-_MARGIN, y=_MARGIN, pivot=(1.0, 0.0)):
         _text("H  help", _SMALL_SIZE, _FAINT)
 
 
@@ -104,7 +106,7 @@ def build_start_gui(frame: GameFrame, choices: Sequence[Choice], chosen: str) ->
     # Left of the ball, where there is room.
     roomy = imgui.GetIO().DisplaySize.x >= 2.4 * _WIDTH
     left, pivot = (_MARGIN, 0.0) if roomy else (None, 0.5)
-    with _panel("start", x=left, pivot=(pivot, 0.5), pad=28.0):
+    with panel("start", x=left, pivot=(pivot, 0.5), pad=28.0):
         _text("ROLLER", _TITLE_SIZE, _GOLD)
         _text("Collect the coins. Reach the finish. Do not fall.", _NORMAL_SIZE, _FAINT)
         imgui.Dummy(imgui.Vec2(0.0, 8.0))
@@ -126,7 +128,7 @@ def build_intro_gui(frame: GameFrame) -> None:
     """Show the intro panel; in the first second there is only the level."""
     if INTRO_S - frame.control_in_s < SPLASH_S:
         return
-    with _panel("intro", pivot=(0.5, 0.5), y_share=0.3, pad=24.0):
+    with panel("intro", pivot=(0.5, 0.5), y_share=0.3, pad=24.0):
         _text(frame.level.title, _LARGE_SIZE, _GOLD)
         _wrapped(frame.level.description)
         _text(f"The keys work in {frame.control_in_s:.0f} s", _NORMAL_SIZE, _FAINT)
@@ -135,7 +137,7 @@ def build_intro_gui(frame: GameFrame) -> None:
 def build_pause_gui() -> Wish | None:
     """Show that the game stands still."""
     wish = None
-    with _panel("pause", pivot=(0.5, 0.5), pad=28.0):
+    with panel("pause", pivot=(0.5, 0.5), pad=28.0):
         _text("Pause", _TITLE_SIZE, _WHITE)
         if _button("Go on", lit=True, height=44.0) or _enter():
             wish = Wish(Command.PAUSE)
@@ -152,7 +154,7 @@ def build_end_gui(frame: GameFrame, following: Choice | None) -> Wish | None:
         following: the next level, if there is one.
     """
     result, wish = frame.result, None
-    with _panel("end", pivot=(0.5, 0.5), pad=28.0):
+    with panel("end", pivot=(0.5, 0.5), pad=28.0):
         title, colour = end_title(frame)
         _text(title, _TITLE_SIZE, colour)
         _rows(
@@ -186,7 +188,7 @@ def end_title(frame: GameFrame) -> tuple[str, Colour]:
 
 def build_agent_gui(frame: GameFrame) -> None:
     """Say who plays, and how that changes."""
-    with _panel("agent", pivot=(0.5, 0.0), y=_MARGIN):
+    with panel("agent", pivot=(0.5, 0.0), y=_MARGIN):
         if frame.agent_plays:
             _text("The agent plays. Press a direction to take over.", _NORMAL_SIZE, _GREEN)
         else:
@@ -195,22 +197,22 @@ def build_agent_gui(frame: GameFrame) -> None:
 
 def build_fall_gui() -> None:
     """Say that the ball fell: the level was loaded again under the player's eyes."""
-    with _panel("fall", pivot=(0.5, 0.5), y_share=0.25):
+    with panel("fall", pivot=(0.5, 0.5), y_share=0.25):
         _text("You fell. Once more!", _LARGE_SIZE, _RED)
 
 
-def build_help_gui() -> None:
-    """Show the keys."""
-    with _panel("help", pivot=(0.5, 0.5), pad=24.0):
+def build_help_gui(keys: Rows) -> None:
+    """Show ``keys``, and what they do."""
+    with panel("help", pivot=(0.5, 0.5), pad=24.0):
         _text("Keys", _LARGE_SIZE, _GOLD)
-        _rows(KEYS_HELP)
+        _rows(keys)
 
 
 # Pieces ----------------------------------------------------------------------------------------
 
 
 @contextmanager
-def _panel(
+def panel(
     name: str,
     *,
     x: float | None = None,
@@ -322,7 +324,7 @@ def _enter() -> bool:
     )
 
 
-def _rows(rows: Sequence[tuple[str, str]]) -> None:
+def _rows(rows: Rows) -> None:
     """Show a table of two columns."""
     with _sized(_NORMAL_SIZE):
         if not imgui.BeginTable("rows", 2, int(imgui.TableFlags.SizingFixedFit)):

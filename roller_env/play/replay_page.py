@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Final, cast
+from typing import Any, ClassVar, Final, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,15 @@ Float64 = npt.NDArray[np.float64]
 
 JUMP_S: Final = 1.0
 """What the arrow keys go forward and back."""
+
+KEYS_HELP: Final = (
+    ("Space, P, Esc", "stand still and go on; at the end, play again"),
+    ("Left, Right", f"go {JUMP_S:.0f} s back or forward; hold to go on"),
+    ("R", "play from the start"),
+    ("C", "next camera"),
+    ("H", "show or hide this help"),
+    ("Mouse", "drag the time line, or click on it"),
+)
 
 _TIMELINE_PIXELS: Final = 640.0
 _MARGIN_PIXELS: Final = 80.0
@@ -191,6 +200,8 @@ class ReplayPlugin(GamePlugin):
 class ReplayScreen(ScreenPlugin):
     """The picture with a time line, on the viewer's thread."""
 
+    keys_help: ClassVar = KEYS_HELP
+
     def __init__(self, replay: Replay) -> None:
         """Show nothing until the replay's plugin sends its level."""
         super().__init__(choices_of(replay))
@@ -201,7 +212,7 @@ class ReplayScreen(ScreenPlugin):
         panels.build_points_gui(frame, self.camera.mode)
         panels.build_hint_gui()
         if self._help:
-            panels.build_help_gui()
+            panels.build_help_gui(self.keys_help)
         return self._build_time_line(frame)
 
     def _build_time_line(self, frame: GameFrame) -> Wish | None:
@@ -210,7 +221,7 @@ class ReplayScreen(ScreenPlugin):
         now_s = frame.result.time_s
         is_playing = frame.phase is Phase.PLAYING
         shown_s = now_s if self._dragged_s is None else self._dragged_s
-        with panels._panel("time", pivot=(0.5, 1.0), y_share=_TIMELINE_SHARE), _styled():
+        with panels.panel("time", pivot=(0.5, 1.0), y_share=_TIMELINE_SHARE), _styled():
             clicked = imgui.Button("Pause" if is_playing else "Play", _BUTTON_SIZE)
             if clicked or imgui.IsKeyPressed(imgui.Key.Space, False):
                 wish = Wish(panels.Command.PAUSE)

@@ -3,7 +3,11 @@
 MuJoCo Studio's web server has no password. As it comes it listens on all interfaces and takes
 WebSockets from pages of any origin; here it listens on this machine's loopback address only, and
 then takes them only from pages that this machine served, so that a page from elsewhere, open in
-the same browser, cannot reach the game either. (Read and tried with MuJoCo 4.0.0.)
+the same browser, cannot reach the game either.
+
+Of the browsers that watch, Studio lets each take the controls from the one that has them ("Steal
+control" in its bar). Here that is not heard: they can ask, and are next when the player gives the
+controls up or is gone. (Read and tried with MuJoCo 4.0.0.)
 """
 
 from __future__ import annotations
@@ -11,7 +15,7 @@ from __future__ import annotations
 import functools
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Any, Final
 
 from mujoco.studio import launch_thread, messages, plugin, viewer_handle, viewer_protocol
@@ -61,6 +65,8 @@ def open_page(
     from mujoco.studio import web_viewer
     from mujoco.studio.web import web_server
 
+    origins = LOCAL_ORIGINS if host == LOOPBACK else None
+
     class PageViewer(web_viewer.WebViewer):  # type: ignore[misc]  # MuJoCo comes without types
         """Studio's web viewer, bound to one address."""
 
@@ -73,8 +79,7 @@ def open_page(
             """Studio wants all interfaces, without asking: no."""
 
         def _start_server(self) -> None:
-            origins = LOCAL_ORIGINS if host == LOOPBACK else None
-            web_server.serve = functools.partial(_plain_serve(), origins=origins)
+            web_server.serve = _serving(web_server._SessionMessage.FORCE_CONTROL, origins)
             super()._start_server()
 
     def view(config: Any, endpoint: Any, viewers: Any) -> None:
@@ -162,7 +167,22 @@ def _launch(
     )
 
 
-def _plain_serve() -> Any:
-    from websockets.asyncio.server import serve
+def _serving(taking: str, origins: Sequence[Any] | None) -> Any:
+    """Return what serves WebSockets in the place of `websockets`' own ``serve``.
 
-    return serve
+    Args:
+        taking: the message by which a browser takes the controls from another one.
+        origins: of the pages that are let in; None for any.
+    """
+    from websockets.asyncio.server import ServerConnection, serve
+    from websockets.typing import Data
+
+    class Seat(ServerConnection):
+        """The connection of a browser that does not take the controls from another one."""
+
+        async def __aiter__(self) -> AsyncIterator[Data]:
+            async for message in super().__aiter__():
+                if message != taking:
+                    yield message
+
+    return functools.partial(serve, origins=origins, create_connection=Seat)

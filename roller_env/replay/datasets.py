@@ -20,13 +20,14 @@ from roller_env.envs.spaces import action_space, observation_space
 from roller_env.game.rewards import RewardWeights
 from roller_env.level import load_level
 from roller_env.physics.presets import PRESETS, PhysicsPreset
-from roller_env.replay.contents import Replay
+from roller_env.replay.contents import Replay, ReplayError
 from roller_env.replay.experience import Experience, experiences
 
 if TYPE_CHECKING:
     from minari import MinariDataset
 
 _DATA_FORMAT: Final = "hdf5"
+_ANY_LEVEL: Final = "classic"
 
 
 def to_minari(
@@ -108,6 +109,25 @@ def to_minari_by_level(replays: Sequence[Replay], prefix: str, **changes: Any) -
         to_minari(group, name, **changes)
         written.append(name)
     return written
+
+
+def check_prefix(prefix: str) -> None:
+    """Refuse, before anything is played, what `to_minari_by_level` could not write.
+
+    Raises:
+        ReplayError: Minari is not installed, or no data set can have such a name.
+    """
+    try:
+        from minari.dataset.minari_dataset import parse_dataset_id
+    except ImportError:
+        raise ReplayError("a data set needs Minari: pip install 'roller-env[demos]'") from None
+    try:
+        parse_dataset_id(f"{prefix}/{_ANY_LEVEL}-v0")
+    except ValueError:
+        raise ReplayError(
+            f"record: found {prefix!r}; the name of a data set begins with words of two or more "
+            "letters, digits, - or _, and / between them, such as roller/human"
+        ) from None
 
 
 def environment_spec(config: EnvConfig) -> gym.envs.registration.EnvSpec | None:

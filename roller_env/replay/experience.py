@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,11 @@ from roller_env.simulation import Simulation
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 Observations = npt.NDArray[np.float32] | dict[str, npt.NDArray[np.float32]]
+
+
+STATES_AT_ONCE: Final = 2**18
+"""Most states of replays that are played together: their observations, 110 numbers each at most,
+then take 115 MB. A single replay may have more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +54,11 @@ class Experience:
         return len(self.rewards)
 
 
-def experiences(replays: Sequence[Replay], **changes: Any) -> list[Experience]:
-    """Play replays again and return what an agent would have seen, done and earned.
+def experiences(replays: Iterable[Replay], **changes: Any) -> Iterator[Experience]:
+    """Play replays again and yield what an agent would have seen, done and earned.
+
+    Replays of one game that follow each other are played together, but no more than
+    `STATES_AT_ONCE`: who lets go of what is yielded needs memory for so many only.
 
     Args:
         replays: of any levels and options.
@@ -66,16 +75,26 @@ def experiences(replays: Sequence[Replay], **changes: Any) -> list[Experience]:
     fixed = {"level", "physics", "control_dt_s", "max_episode_steps"} & changes.keys()
     if fixed:
         raise ValueError(f"{', '.join(sorted(fixed))}: these are the replay's own")
-    # Those of one game are played together.
-    groups: dict[tuple[str, str, bool], list[int]] = {}
-    for number, replay in enumerate(replays):
-        key = (replay.level_hash, replay.options.model_dump_json(), replay.intro)
-        groups.setdefault(key, []).append(number)
-    found: dict[int, Experience] = {}
-    for numbers in groups.values():
-        played = _play([replays[number] for number in numbers], changes)
-        found.update(zip(numbers, played, strict=True))
-    return [found[number] for number in range(len(replays))]
+    return (one for group in _groups(replays) for one in _play(group, changes))
+
+
+def _groups(replays: Iterable[Replay]) -> Iterator[list[Replay]]:
+    """Yield replays that can be played together, in their order."""
+    for _, alike in itertools.groupby(replays, _game_of):
+        group: list[Replay] = []
+        longest = 0
+        for replay in alike:
+            longest = max(longest, len(replay) + 1)
+            if group and longest * (len(group) + 1) > STATES_AT_ONCE:
+                yield group
+                group, longest = [], len(replay) + 1
+            group.append(replay)
+        yield group
+
+
+def _game_of(replay: Replay) -> tuple[str, str, bool]:
+    """Return what is the same for replays that can be played together."""
+    return replay.level_hash, replay.options.model_dump_json(), replay.intro
 
 
 def actions_of(mode: ActionMode, force_n: Float64) -> npt.NDArray[Any]:
@@ -128,7 +147,8 @@ def _play(replays: list[Replay], changes: dict[str, Any]) -> list[Experience]:
     for row, replay in enumerate(replays):
         force[: len(replay), row] = replay.force_n
         expected[: len(replay) + 1, row] = replay.checksums
-    seen, reward = [simulation.observe()], np.zeros((steps, len(replays)))
+    seen = np.empty((steps + 1, *simulation.observe().shape), dtype=np.float32)
+    seen[0], reward = simulation.observe(), np.zeros((steps, len(replays)))
     terminated, truncated = (np.zeros((steps, len(replays)), dtype=bool) for _ in range(2))
     # Control that comes back within a step does something in it.
     waits = np.zeros(len(replays), dtype=np.int64)
@@ -138,13 +158,12 @@ def _play(replays: list[Replay], changes: dict[str, Any]) -> list[Experience]:
         transition = simulation.step(force[step], hold=lengths <= step)
         reward[step] = transition.reward
         terminated[step], truncated[step] = transition.terminated, transition.truncated
-        seen.append(simulation.observe())
+        seen[step + 1] = simulation.observe()
         _compare(simulation, rows[lengths > step], expected[step + 1, lengths > step], step + 1)
-    table = np.stack(seen)
     return [
         Experience(
             replay=replay,
-            observations=shape_observation(config, table[begin : end + 1, row]),
+            observations=shape_observation(config, seen[begin : end + 1, row]),
             actions=actions_of(config.action, replay.force_n[begin:]),
             rewards=reward[begin:end, row].copy(),
             terminated=terminated[begin:end, row].copy(),

@@ -18,9 +18,14 @@ from roller_env.game.actions import DIRECTIONS, forces
 from roller_env.game.observations import STATE_ENTRIES, layout
 from roller_env.level import Level
 from roller_env.level.expand import coin_positions
+from roller_env.replay.contents import Replay
+from roller_env.replay.playback import Playback
 from roller_env.simulation import Simulation
 
 Float64 = npt.NDArray[np.float64]
+
+PLAYER: Final = "scripted player"
+"""Who played, in a replay's words."""
 
 CRUISE_M_S: Final = 3.0
 """Speed on a straight way."""
@@ -171,6 +176,26 @@ class ScriptedPlayer:
             if _meets(begin, finish, half):
                 return True
         return False
+
+
+def meant(replay: Replay) -> Float64:
+    """Return the force of the keys that the player would have held in every step of a replay.
+
+    Of its own replays that is what it meant where it slipped, and elsewhere what it did. To learn
+    what was meant from states that noise has led to is DART (Laskey et al. 2017).
+
+    Args:
+        replay: of a level with a route, by whomever.
+
+    Returns:
+        (T, 2) newtons.
+    """
+    playback, player = Playback(replay), ScriptedPlayer(replay.level)
+    forces_n = np.zeros_like(replay.force_n)
+    for step in range(len(replay)):
+        playback.seek(step)
+        forces_n[step] = player(playback.simulation)[0]
+    return forces_n
 
 
 def itinerary(level: Level) -> list[Stop]:

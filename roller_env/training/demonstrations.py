@@ -10,6 +10,7 @@ from typing import Any, cast, get_args
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
+from tqdm import tqdm
 
 from roller_env.config import EnvConfig, make_config
 from roller_env.envs.spaces import action_space, observation_space
@@ -17,8 +18,9 @@ from roller_env.game.actions import ActionMode, forces
 from roller_env.game.rewards import RewardWeights
 from roller_env.level import load_level
 from roller_env.replay import Replay, ReplayError, load_replay
-from roller_env.replay.experience import actions_of, experiences
+from roller_env.replay.experience import Experience, actions_of, experiences
 from roller_env.replay.file import SUFFIX
+from roller_env.replay.scripted import PLAYER, meant
 from roller_env.training.config import TrainingConfig
 from roller_env.training.policy import Observations
 
@@ -97,13 +99,23 @@ def _from_replays(replays: Sequence[Replay], wanted: EnvConfig) -> list[Demonstr
             )
     names = ("observation", "action", "reward", "reward_weights", "discount")
     played = experiences(replays, **{name: getattr(wanted, name) for name in names})
+    # Thinned one by one: a person's game has ten times the states that are learnt from.
     return [
         _thinned(
-            Demonstration(e.observations, e.actions, e.rewards),
+            Demonstration(e.observations, _worth_imitating(e, wanted.action), e.rewards),
             wanted.control_dt_s / e.replay.options.control_dt_s,
         )
-        for e in played
+        for e in tqdm(played, total=len(replays), desc="demonstrations", unit=" episodes")
     ]
+
+
+def _worth_imitating(experience: Experience, mode: ActionMode) -> npt.NDArray[Any]:
+    """Return an episode's actions; the scripted player can tell what it meant where it slipped."""
+    replay = experience.replay
+    if replay.player != PLAYER or replay.level.route is None:
+        return experience.actions
+    # The episode is without its intro.
+    return actions_of(mode, meant(replay)[len(replay) - len(experience) :])
 
 
 def _thinned(demonstration: Demonstration, ratio: float) -> Demonstration:

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import pytest
 
-from tests.play.stand import Stand
+from tests.play.stand import ReplayStand, Stand
 
 NAMES: Final = ("chromium", "chromium-browser", "google-chrome")
 
@@ -59,5 +59,13 @@ def chromium() -> Iterator[Any]:
 def stand() -> Iterator[Stand]:
     """A game on the lane, on a page."""
     stand = Stand()
+    yield stand
+    assert stand.close() == 0
+
+
+@pytest.fixture(scope="module")
+def replay_stand() -> Iterator[ReplayStand]:
+    """A replay, on a page."""
+    stand = ReplayStand()
     yield stand
     assert stand.close() == 0

@@ -1,4 +1,4 @@
-"""The game on a page, served by a process of its own, and a person's eyes and hands on it.
+"""The game or a replay on a page, served by a process of its own, and a person's eyes and hands.
 
 A process of its own, because Studio (MuJoCo 4.0.0) can have one page in the life of a process: the
 second one's viewer never ends.
@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -21,9 +21,12 @@ from PIL import Image
 
 from roller_env.play.app import Choices, GamePlugin, ScreenPlugin
 from roller_env.play.panels import Choice
-from roller_env.play.server import LOOPBACK, open_page, run
-from roller_env.play.session import Phase
+from roller_env.play.replay_page import replay_plugins
+from roller_env.play.scene import PlayScene
+from roller_env.play.server import LOOPBACK, Plugins, open_page, run
+from roller_env.play.session import GameFrame, Phase
 from roller_env.play.sound import CoinSound
+from roller_env.replay import load_replay, shipped_replays
 from tests.play.lane import Witness, game
 
 Picture = npt.NDArray[np.int64]
@@ -45,6 +48,8 @@ WATCHED_BALL: Final = (slice(120, 165), slice(190, 230))
 """Of the ball at the start, as a second browser sees it."""
 MIDDLE: Final = (slice(110, 260), slice(60, 360))
 """Of the ball, and of the floor round it."""
+TIME_LINE: Final = (slice(230, 266), slice(110, 385))
+"""Of a replay's time line."""
 
 
 class Status(NamedTuple):
@@ -58,6 +63,8 @@ class Status(NamedTuple):
         coins: collected.
         success: at the finish.
         camera: the mode of the player's.
+        answer_s: shortest time so far from reading a change of the keys to handing the picture
+            with it to the drawing, seconds.
     """
 
     phase: Phase
@@ -67,6 +74,21 @@ class Status(NamedTuple):
     coins: int
     success: bool
     camera: int
+    answer_s: float
+
+
+class ReplayStatus(NamedTuple):
+    """A replay as it stands in the other process.
+
+    Attributes:
+        phase: playing or paused.
+        time_s: the moment shown.
+        duration_s: of the whole replay.
+    """
+
+    phase: Phase
+    time_s: float
+    duration_s: float
 
 
 def wait_for(what: str, holds: Callable[[], bool], pause: Callable[[], Any] | None = None) -> None:
@@ -87,30 +109,30 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-class Stand:
-    """A game on the lane, served on a free port until `close`."""
+def is_served(host: str, port: int) -> bool:
+    """Say whether somebody listens there."""
+    with socket.socket() as probe:
+        return probe.connect_ex((host, port)) == 0
 
-    def __init__(self, host: str = LOOPBACK) -> None:
+
+class HasUrl(Protocol):
+    """Something with a page."""
+
+    url: str
+
+
+class Served:
+    """What `make` makes, served on a free port until `close`."""
+
+    def __init__(self, make: Make, host: str = LOOPBACK) -> None:
         self.host = host
         self.port = free_port()
+        self.url = f"http://{host}:{self.port}/"
         spawn = multiprocessing.get_context("spawn")
         self._line, theirs = spawn.Pipe()
-        self._process = spawn.Process(target=_serve, args=(host, self.port, theirs))
+        self._process = spawn.Process(target=_serve, args=(make, host, self.port, theirs))
         self._process.start()
         wait_for("the page is served", self._is_served)
-
-    @property
-    def status(self) -> Status:
-        """The game as it stands."""
-        self._line.send("status")
-        status = self._line.recv()
-        assert isinstance(status, Status)
-        return status
-
-    @property
-    def url(self) -> str:
-        """Where the page is."""
-        return f"http://{self.host}:{self.port}/"
 
     def close(self) -> int | None:
         """Stop serving, and return the process's exit code."""
@@ -118,44 +140,122 @@ class Stand:
         self._process.join(PATIENCE_S)
         return self._process.exitcode
 
+    def _ask(self) -> Any:
+        self._line.send("status")
+        return self._line.recv()
+
     def _is_served(self) -> bool:
         assert self._process.is_alive(), f"it ended with {self._process.exitcode}"
-        with socket.socket() as probe:
-            return probe.connect_ex((self.host, self.port)) == 0
+        return is_served(self.host, self.port)
 
 
-def _serve(host: str, port: int, line: Connection[Any, Any]) -> None:
-    """Run the game, in the other process, until ``line`` says "end"."""
-    witness, ended = Witness(), threading.Event()
-    choices = Choices((Choice("lane", "Lane"),), "lane")
-    session = game(started=False, observers=[witness])
-    plugin = GamePlugin(lambda _: session, choices, CoinSound(muted=True), "low")
-    screen = ScreenPlugin(choices)
+class Stand(Served):
+    """A game on the lane."""
+
+    def __init__(self, host: str = LOOPBACK) -> None:
+        super().__init__(_game, host)
+
+    @property
+    def status(self) -> Status:
+        """The game as it stands."""
+        status = self._ask()
+        assert isinstance(status, Status)
+        return status
+
+
+class ReplayStand(Served):
+    """The shipped replay of the flat level."""
+
+    def __init__(self) -> None:
+        super().__init__(_replay)
+
+    @property
+    def status(self) -> ReplayStatus:
+        """The replay as it stands."""
+        status = self._ask()
+        assert isinstance(status, ReplayStatus)
+        return status
+
+
+Asked = Callable[[], NamedTuple]
+Make = Callable[[], tuple[Plugins, Asked]]
+"""Makes plugins and what tells how they stand; importable, for the other process."""
+
+
+def _serve(make: Make, host: str, port: int, line: Connection[Any, Any]) -> None:
+    """Serve what is made, in the other process, until ``line`` says "end"."""
+    plugins, asked = make()
+    ended = threading.Event()
 
     def answer() -> None:
         while line.recv() == "status":
-            frame, force = plugin.latest, witness.forces[-1][-1:]
-            line.send(
-                Status(
-                    phase=frame.phase,
-                    episode=frame.episode,
-                    ball_x=float(frame.after[frame.ball]),
-                    pushed=bool(np.any(force)),
-                    coins=frame.result.coins,
-                    success=frame.result.success,
-                    camera=screen.camera.mode,
-                )
-            )
+            line.send(asked())
         ended.set()
 
     threading.Thread(target=answer, daemon=True).start()
-    run(open_page([plugin, screen], port=port, host=host), ended.is_set)
+    run(open_page(plugins, port=port, host=host), ended.is_set)
+
+
+class TimedScreen(ScreenPlugin):
+    """A screen that tells how soon keys are in what is drawn."""
+
+    def __init__(self, choices: Choices) -> None:
+        super().__init__(choices)
+        self.answer_s = np.inf
+        self._changed_s: float | None = None
+
+    def _wait_for_answer(self, told_s: float) -> None:
+        self._changed_s = told_s
+        super()._wait_for_answer(told_s)
+
+    def _draw(self, frame: GameFrame, scene: PlayScene, now: float) -> None:
+        super()._draw(frame, scene, now)
+        if self._changed_s is not None and self._answered_s >= self._changed_s:
+            self.answer_s = min(self.answer_s, time.monotonic() - self._changed_s)
+            self._changed_s = None
+
+
+def _game() -> tuple[Plugins, Asked]:
+    """Make a game on the lane."""
+    witness = Witness()
+    choices = Choices((Choice("lane", "Lane"),), "lane")
+    session = game(started=False, observers=[witness])
+    plugin = GamePlugin(lambda _: session, choices, CoinSound(muted=True), "low")
+    screen = TimedScreen(choices)
+
+    def asked() -> Status:
+        frame, force = plugin.latest, witness.forces[-1][-1:]
+        return Status(
+            phase=frame.phase,
+            episode=frame.episode,
+            ball_x=float(frame.after[frame.ball]),
+            pushed=bool(np.any(force)),
+            coins=frame.result.coins,
+            success=frame.result.success,
+            camera=screen.camera.mode,
+            answer_s=screen.answer_s,
+        )
+
+    return (plugin, screen), asked
+
+
+def _replay() -> tuple[Plugins, Asked]:
+    """Make the page of a replay."""
+    plugin, screen = replay_plugins(
+        load_replay(shipped_replays()["flat"]), CoinSound(muted=True), "low"
+    )
+    session = plugin.replay_session
+
+    def asked() -> ReplayStatus:
+        return ReplayStatus(session.phase, session.time_s, session.duration_s)
+
+    return (plugin, screen), asked
 
 
 class Browser:
-    """One page of the browser, with the game on it."""
+    """One page of the browser, with the game or the replay on it."""
 
-    def __init__(self, chromium: Any, stand: Stand, *, controls: bool = True) -> None:
+    def __init__(self, chromium: Any, stand: HasUrl, *, controls: bool = True) -> None:
         self._context = chromium.new_context(viewport=SIZE)
         self.page = self._context.new_page()
         self.page.set_default_timeout(1000.0 * PATIENCE_S)
@@ -218,7 +318,13 @@ def dark(part: Picture) -> float:
     return float((part.max(axis=-1) < 110).mean())
 
 
-def gold(part: Picture) -> int:
-    """Return how many pixels are of the gold in which the points are written."""
+def gold_pixels(part: Picture) -> npt.NDArray[np.bool_]:
+    """Say which pixels are of the gold of the points and of the time line's grab."""
     red, green, blue = (part[..., channel] for channel in range(3))
-    return int(((red > 180) & (green > 130) & (blue < 120)).sum())
+    of_gold: npt.NDArray[np.bool_] = (red > 180) & (green > 130) & (blue < 120)
+    return of_gold
+
+
+def gold(part: Picture) -> int:
+    """Return how many pixels are of that gold."""
+    return int(gold_pixels(part).sum())

@@ -6,11 +6,16 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from mujoco.studio.web.web_server import _SessionMessage as StudioMessage
+from websockets.sync.client import connect
 
+from roller_env.play.app import ANSWER_S
 from roller_env.play.session import Phase
+from tests.play.lane import FRAME_S
 from tests.play.stand import (
     MIDDLE,
     PANEL,
+    PATIENCE_S,
     POINTS,
     SCENE,
     WATCHED_BALL,
@@ -112,6 +117,12 @@ def test_p_pauses_and_escape_goes_on(page: Browser, stand: Stand) -> None:
     page.press("Escape", "time goes on", lambda: stand.status.phase is Phase.PLAYING)
 
 
+def test_h_shows_the_keys_and_hides_them(page: Browser) -> None:
+    before = dark(page.settled()[MIDDLE])
+    page.press("h", "the help is there", lambda: dark(page.picture()[MIDDLE]) > before + 0.4)
+    page.press("h", "it is gone", lambda: dark(page.picture()[MIDDLE]) < before + 0.1)
+
+
 def test_c_changes_the_camera(page: Browser, stand: Stand) -> None:
     before, mode = page.settled()[SCENE], stand.status.camera
     page.press("c", "the mode changes", lambda: stand.status.camera != mode)
@@ -147,3 +158,23 @@ def test_a_second_browser_watches_and_cannot_steer(
         assert stand.status.episode == episode
     finally:
         guest.close()
+
+
+def test_a_second_browser_cannot_take_the_controls_but_ask_for_them(
+    page: Browser, stand: Stand
+) -> None:
+    told: list[str | bytes] = []
+    with connect(f"ws://{stand.host}:{stand.port}/state?sid=guest") as guest:
+        guest.send(StudioMessage.FORCE_CONTROL)
+        guest.send(StudioMessage.REQUEST_CONTROL)
+        while not any("role=spectator;queue_pos=1" in str(line) for line in told):
+            told.append(guest.recv(timeout=PATIENCE_S))
+        page.press("w", "the player still steers", lambda: stand.status.ball_x > 1.0)
+    assert "grant" not in told
+
+
+def test_a_key_is_in_the_picture_that_is_drawn_when_it_is_read(page: Browser, stand: Stand) -> None:
+    for _ in range(3):
+        page.press("w", "the ball is pushed", lambda: stand.status.pushed)
+        page.wait("the push ends", lambda: not stand.status.pushed)
+    assert stand.status.answer_s < ANSWER_S < FRAME_S

@@ -11,7 +11,13 @@ import pytest
 from roller_env.config import make_config
 from roller_env.game.rewards import RewardWeights
 from roller_env.physics.presets import PhysicsPreset
-from roller_env.replay.datasets import environment_spec, to_minari, to_minari_by_level
+from roller_env.replay import ReplayError
+from roller_env.replay.datasets import (
+    check_prefix,
+    environment_spec,
+    to_minari,
+    to_minari_by_level,
+)
 from tests.builders import make_level
 from tests.replay.recording import straight_on, wandered
 
@@ -97,3 +103,11 @@ def test_an_environment_is_named_only_where_that_says_all_of_it() -> None:
         {"level": "gate", "reward_weights": RewardWeights(coin=2.0)},
     ):
         assert environment_spec(make_config(**options)) is None
+
+
+@pytest.mark.parametrize("prefix", ["x", "my games", "/roller", "roller/", ""])
+def test_what_cannot_begin_the_name_of_a_data_set_is_refused(prefix: str) -> None:
+    with pytest.raises(ReplayError, match=f"record: found '{prefix}'; .* such as roller/human"):
+        check_prefix(prefix)
+    check_prefix("roller/human")
+    check_prefix("mine")

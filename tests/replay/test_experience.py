@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,7 @@ from roller_env.envs.single import RollerEnv
 from roller_env.game.actions import DIRECTIONS, forces
 from roller_env.game.rules import INTRO_S
 from roller_env.replay import ReplayError, record_episode
+from roller_env.replay import experience as experience_module
 from roller_env.replay.experience import actions_of, experiences
 from tests.replay.recording import pushed_otherwise, straight_on, wandered
 
@@ -53,6 +55,7 @@ def _at(observations: Any, step: int) -> Any:
 
 def test_replays_of_all_lengths_and_levels_keep_their_order() -> None:
     played = [wandered(level, seed=seed) for seed in (1, 2) for level in ("bridge", "flat")]
+    played += [wandered("flat", seed=3)]
     together = experiences(played)
     for replay, experience in zip(played, together, strict=True):
         (alone,) = experiences([replay])
@@ -60,6 +63,24 @@ def test_replays_of_all_lengths_and_levels_keep_their_order() -> None:
         assert len(experience) == len(replay)
         assert equal(experience.observations, alone.observations)
         assert np.array_equal(experience.rewards, alone.rewards)
+
+
+def test_no_more_is_held_than_is_played_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    played = [wandered("flat", seed=seed, max_episode_steps=30) for seed in range(6)]
+    assert {len(replay) for replay in played} == {30}
+    monkeypatch.setattr(experience_module, "STATES_AT_ONCE", 2 * 31)
+    yielded = experiences(iter(played))
+    tables = [weakref.ref(_table(next(yielded).observations)) for _ in range(6)]
+    assert [table() is None for table in tables] == [True, True, True, True, False, False]
+    assert next(yielded, None) is None
+    assert [table() for table in tables] == [None] * 6
+
+
+def _table(observations: Any) -> Any:
+    """Return the array of all who were played together, of which this is a part."""
+    while observations.base is not None:
+        observations = observations.base
+    return observations
 
 
 def test_there_is_nothing_to_learn_from_the_intro() -> None:
@@ -78,7 +99,7 @@ def test_an_episode_that_was_left_before_its_end_has_none() -> None:
 
 def test_a_replay_that_is_not_exact_here_teaches_nothing() -> None:
     with pytest.raises(ReplayError, match=r"1 of 1 replays .* part at step 6"):
-        experiences([pushed_otherwise(wandered("flat"), 5)])
+        list(experiences([pushed_otherwise(wandered("flat"), 5)]))
 
 
 @pytest.mark.parametrize("option", ["physics", "control_dt_s", "level"])
@@ -89,7 +110,7 @@ def test_the_game_itself_is_the_replays_own(option: str) -> None:
 
 def test_pictures_are_not_made_again() -> None:
     with pytest.raises(ValueError, match="choose state, rays or dict"):
-        experiences([wandered("flat")], observation="pixels")
+        list(experiences([wandered("flat")], observation="pixels"))
 
 
 @given(st.lists(st.integers(0, len(DIRECTIONS) - 1), max_size=20))
@@ -112,7 +133,7 @@ def test_a_force_that_no_key_makes_is_no_action_of_keys() -> None:
     weaker = record_episode(played.config(), lambda _: np.array([[2.0, 0.0]]), seed=0)
     for mode in ("directions", "keys"):
         with pytest.raises(ReplayError, match=f"step 0, .* is no action of mode '{mode}'"):
-            experiences([weaker], action=mode)
+            list(experiences([weaker], action=mode))
     with pytest.raises(ReplayError, match="no action of mode 'force'"):
         actions_of("force", np.array([[1e3, 0.0]]))
     assert replace(weaker, player="x").player == "x"

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from roller_env.level import load_level, shipped_levels
 from roller_env.level.expand import coin_positions
 from roller_env.replay import Versions, load_replay, record_episode, shipped_replays, verify
-from roller_env.replay.scripted import ScriptedPlayer, itinerary, shortest_way
+from roller_env.replay.scripted import ScriptedPlayer, itinerary, meant, shortest_way
 from tests.builders import make_level
 from tests.replay.recording import wandered
 
@@ -85,6 +85,17 @@ def test_a_player_that_slips_recovers() -> None:
     assert steady.result.success
     assert slipping.result.success
     assert len(slipping) > len(steady)
+
+
+@pytest.mark.parametrize("level", ["bridge", "gate"])
+def test_what_the_player_meant_is_what_it_did_but_for_its_slips(level: str) -> None:
+    config, loaded = wandered(level).config(), load_level(level)
+    steady = record_episode(config, ScriptedPlayer(loaded), seed=1)
+    assert np.array_equal(meant(steady), steady.force_n)
+    slipping = record_episode(config, ScriptedPlayer(loaded, slips=0.3, seed=1), seed=1)
+    done_otherwise = (meant(slipping) != slipping.force_n).any(axis=1)
+    # One in nine slips holds the keys that were meant.
+    assert 0.1 < done_otherwise.mean() < 0.4
 
 
 def test_slips_are_a_share() -> None:
