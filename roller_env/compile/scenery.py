@@ -71,6 +71,8 @@ def build_scenery(level: Level, preset: PhysicsPreset) -> mujoco.MjModel:
 
 def add_scenery(spec: mujoco.MjSpec, level: Level) -> None:
     """Add to the level's spec what pictures of it need."""
+    # Coins and machines are moved by hand: every picture needs all of its geoms posed anew.
+    spec.option.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     _set_view(spec)
     _add_sky_and_sun(spec)
     _add_state_materials(spec)

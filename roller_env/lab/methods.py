@@ -61,6 +61,9 @@ class MujocoMethod:
         spec.option.cone = _CONES[self.cone]
         spec.option.timestep = dt_s
         spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+        if self.integrator == "discrete":
+            # MuJoCo 4.0 refuses it together with the sleep of a level's fixed geoms.
+            spec.option.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
 
 

@@ -7,6 +7,8 @@ import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
 
+from roller_env.physics.profiler import profiler_off
+
 Float64 = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.int64]
 
@@ -61,12 +63,14 @@ class Stepper:
         """
         if rows is None:
             self._path[:, 0] = self.qpos
-            self._batch.rollout(self.substeps, record=("qpos",), out={"qpos": self._recorded})
+            with profiler_off():
+                self._batch.rollout(self.substeps, record=("qpos",), out={"qpos": self._recorded})
             self._path[:, 1:] = self._recorded
             return self._path
         path = self._path[: len(rows)]
         path[:, 0] = self.qpos[rows]
-        path[:, 1:] = self._batch.rollout(self.substeps, record=("qpos",), ids=rows)["qpos"]
+        with profiler_off():
+            path[:, 1:] = self._batch.rollout(self.substeps, record=("qpos",), ids=rows)["qpos"]
         return path
 
     def diverged(self) -> npt.NDArray[np.bool_]:

@@ -6,6 +6,7 @@ import copy
 
 import mujoco
 import numpy as np
+import pytest
 
 from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.compile.mjcf import MIDPHASE_GEOMS
@@ -57,8 +58,11 @@ def plain(model: mujoco.MjModel) -> mujoco.MjModel:
     return twin
 
 
-def test_fixed_pieces_that_are_posed_once_change_nothing_of_a_game_with_resets_and_rays() -> None:
-    compiled = compile_level(many_boxes(200))
+@pytest.mark.parametrize("level", ["classic", many_boxes(200)], ids=["classic", "200 boxes"])
+def test_fixed_pieces_that_are_posed_once_change_nothing_of_a_game_with_resets_and_rays(
+    level: Level | str,
+) -> None:
+    compiled = compile_level(level if isinstance(level, Level) else load_level(level))
     assert keeps_poses(compiled.model)
     steppers = [Stepper(model, 5, 12, 2) for model in (compiled.model, plain(compiled.model))]
     generator = np.random.default_rng(1)

@@ -135,6 +135,7 @@ def test_the_options_are_the_presets(small: Level, physics: str) -> None:
     assert option.integrator == getattr(mujoco.mjtIntegrator, f"mjINT_{preset.integrator.upper()}")
     assert option.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
     assert option.impratio == preset.impratio
+    assert option.solver == getattr(mujoco.mjtSolver, f"mjSOL_{preset.solver.upper()}")
     assert option.iterations == preset.iterations
     assert option.tolerance == preset.tolerance
     assert option.jacobian == mujoco.mjtJacobian.mjJAC_DENSE

@@ -9,6 +9,7 @@ from roller_env.lab.presets.setting import Setting
 from roller_env.physics.presets import PRESETS, PhysicsPreset
 
 DEFAULT: Final = PRESETS["default"]
+FAST: Final = PRESETS["fast"]
 RK4: Final = PRESETS["accurate"]
 
 
@@ -30,6 +31,7 @@ def _flag(name: str, on: bool) -> Setting:
 
 _FAST_CONTACTS: Final = 1 / 120
 _PGS: Final = (("solver", "PGS"),)
+_DISCRETE: Final = (("integrator", "discrete"),)
 _MANY: Final = replace(DEFAULT, iterations=500)
 _SPECULATIVE: Final = (("speculative", True), ("midphase", True))
 
@@ -39,9 +41,10 @@ SETTINGS: Final[dict[str, Setting]] = {
         *(Setting(name, "presets", preset) for name, preset in PRESETS.items()),
         *(Setting(f"1/{hz}", "time step", _rate(hz)) for hz in (60, 80, 480, 960)),
         *(Setting(f"RK4 1/{hz}", "RK4", _rate(hz, RK4)) for hz in (60, 120, 240, 480)),
-        *(_integrator(name) for name in ("Euler", "implicit", "discrete")),
+        *(_integrator(name) for name in ("Euler", "implicit")),
+        Setting("discrete", "integrator", options=_DISCRETE, flags=(("sleep", False),)),
         Setting("pyramidal", "cone", replace(DEFAULT, cone="pyramidal")),
-        Setting("impratio 1", "cone", replace(DEFAULT, impratio=1.0)),
+        Setting("impratio 10", "cone", replace(DEFAULT, impratio=10.0)),
         Setting("impratio 100", "cone", replace(DEFAULT, impratio=100.0)),
         Setting("impedance 0.99", "contacts", impedance=0.99),
         Setting("impedance 0.9999", "contacts", impedance=0.9999),
@@ -65,11 +68,14 @@ SETTINGS: Final[dict[str, Setting]] = {
         _flag("warmstart", False),
         _flag("island", True),
         _flag("midphase", True),
-        _flag("sleep", True),
+        _flag("sleep", False),
         _flag("speculative", True),
         Setting("1/60 speculative", "combinations", _rate(60), flags=_SPECULATIVE),
         Setting("1/80 speculative", "combinations", _rate(80), flags=_SPECULATIVE),
-        Setting("1/120 PGS, 500 it.", "combinations", _rate(120, _MANY), _PGS),
+        Setting("1/120 Newton", "combinations", _rate(120)),
+        Setting("1/100 PGS", "combinations", _rate(100, FAST)),
+        Setting("1/110 PGS", "combinations", _rate(110, FAST)),
+        Setting("fast, 50 iterations", "combinations", replace(FAST, iterations=50)),
         Setting("1/480 contacts ×0.5", "combinations", _rate(480), stiffness=0.5),
         Setting("1/120 Euler", "combinations", _rate(120), options=(("integrator", "Euler"),)),
         Setting("1/480 Euler", "combinations", _rate(480), options=(("integrator", "Euler"),)),

@@ -294,7 +294,10 @@ def _draw_ways(axes: Axes, rows: Sequence[EconomyRow]) -> None:
 
 
 def _draw_sizes(axes: Axes, rows: Sequence[EconomyRow]) -> None:
-    styles = {AS_CHOSEN: (_AFTER, 2.6, "o"), "fixed geoms posed every step": ("#8d96a3", 1.6, "s")}
+    styles = {
+        AS_CHOSEN: (_AFTER, 2.6, "o"),
+        "fixed geoms posed in every step": ("#8d96a3", 1.6, "s"),
+    }
     for what in dict.fromkeys(row.what for row in rows):
         own = [row for row in rows if row.what == what]
         colour, width, marker = styles.get(what, ("#c9b27c", 1.6, "^"))

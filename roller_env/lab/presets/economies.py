@@ -133,7 +133,6 @@ def _cells(spec: mujoco.MjSpec, level: Level) -> None:
     """Leave floors unmerged, with what the compiler does for levels of so many geoms."""
     _unmerged(spec, level)
     set_flag(spec.option, "midphase", True)
-    set_flag(spec.option, "sleep", True)
 
 
 AS_CHOSEN: Final = "as compiled"
@@ -146,7 +145,7 @@ CLASSIC: Final[dict[str, Change]] = {
     "coins as sites": _coins(as_geoms=False),
     "constraint islands on": _flag("island", True),
     "midphase on": _flag("midphase", True),
-    "fixed geoms posed once (sleep)": _flag("sleep", True),
+    "fixed geoms posed in every step": _flag("sleep", False),
     "plate and gate without joints": _fixed_movers,
     "no plate, no gate": _no_movers,
 }
@@ -160,7 +159,7 @@ def _plain(spec: mujoco.MjSpec, _level: Level) -> None:
 
 _SIZES: Final[dict[str, Change]] = {
     AS_CHOSEN: _as_chosen,
-    "fixed geoms posed every step": _flag("sleep", False),
+    "fixed geoms posed in every step": _flag("sleep", False),
     "neither midphase nor posed once": _plain,
 }
 """Ways to model levels of many boxes."""

@@ -1,0 +1,43 @@
+"""MuJoCo's profiler is off while the game steps, and as it was afterwards."""
+
+from __future__ import annotations
+
+import mujoco
+import pytest
+
+from roller_env.compile.compiled import compile_level
+from roller_env.physics.profiler import profiler_off
+from tests.builders import make_level
+
+STEP = int(mujoco.mjtTimer.mjTIMER_STEP)
+
+
+def falling_ball() -> mujoco.MjModel:
+    return compile_level(make_level()).model
+
+
+def time_taken(data: mujoco.MjData) -> float:
+    """Return what MuJoCo's own profiler has summed up for steps, microseconds."""
+    return float(data.timer[STEP].duration)
+
+
+def test_steps_are_timed_as_ever_outside_and_not_inside() -> None:
+    model = falling_ball()
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 10)
+    before = time_taken(data)
+    assert before > 0.0
+    with profiler_off():
+        mujoco.mj_step(model, data, 10)
+    assert time_taken(data) == before
+    mujoco.mj_step(model, data, 10)
+    assert time_taken(data) > before
+
+
+def test_the_profiler_is_on_again_after_an_error() -> None:
+    model = falling_ball()
+    data = mujoco.MjData(model)
+    with pytest.raises(RuntimeError, match="in between"), profiler_off():
+        raise RuntimeError("in between")
+    mujoco.mj_step(model, data)
+    assert time_taken(data) > 0.0
