@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.config import MAX_ENVS, EnvConfig, check_whole
-from roller_env.game import observations, rewards, rules
+from roller_env.game import observations, rewards, rules, sweep
 from roller_env.game.state import GameState, score_percent
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level, load_level
@@ -91,8 +91,10 @@ class Simulation:
         self.num_envs = num_envs
         self.compiled: CompiledLevel = compile_level(load_level(config.level), config.physics)
         self.divergences = 0
+        self._duration_s = config.substeps * self.compiled.preset.dt_s
         self._levels = LevelTable.of([self.compiled.level])
         self._level_of_row = np.zeros(num_envs, dtype=np.int64)
+        self._views: dict[int, LevelTable] = {}
         self.table = self._levels.for_rows(self._level_of_row)
         self.state = GameState.initial(self.table)
         # No episode has begun, so that there is nothing to step before the first reset.
@@ -114,7 +116,7 @@ class Simulation:
     @property
     def duration_s(self) -> float:
         """Length of a control step."""
-        return self.config.substeps * self.compiled.preset.dt_s
+        return self._duration_s
 
     @property
     def ball_position(self) -> Float64:
@@ -172,7 +174,7 @@ class Simulation:
         rows = np.arange(self.num_envs) if rows is None else np.sort(self._checked(rows))
         if len(rows) == 0:
             return
-        table = self._levels.for_rows(self._level_of_row[rows])
+        table = self._table_of(rows)
         self._stepper.reset(rows)
         jitter = np.array([self._generators[row].uniform(-1.0, 1.0, 2) for row in rows])
         start = table.start.copy()
@@ -199,7 +201,7 @@ class Simulation:
             rows = np.flatnonzero(~idle)
             if len(rows):
                 part = GameState(**self.state.copy_rows(rows))
-                table = self._levels.for_rows(self._level_of_row[rows])
+                table = self._table_of(rows)
                 reward[rows] = self._step_rows(rows, part, table, force_n[rows])
                 self.state.set_rows(rows, part.copy_rows())
         return Transition(
@@ -218,16 +220,14 @@ class Simulation:
         if diverged.any():
             self._end_diverged(every, diverged, path, before, table)
             state.diverged |= diverged
-            # Put back at the start, the ball must not collect what lies there.
-            state.touching[diverged] = True
         ball = self.compiled.ball_qpos
-        motion = rules.Motion(
+        motion = sweep.Motion(
             ball=path[:, :, ball : ball + 3],
             plate=path[:, -1, self.compiled.plate_qpos],
             velocity=self._velocity[every],
             duration_s=self.duration_s,
         )
-        events = rules.find_events(state, table, motion)
+        events = sweep.find_events(state, table, motion)
         reward = rewards.points_reward(events, self.config.reward_weights)
         rules.apply(state, table, motion, events)
         state.truncated = ~state.terminated & (state.steps >= self._max_steps[every])
@@ -260,7 +260,7 @@ class Simulation:
         if self.config.reward != "shaped":
             return
         part = GameState(**self.state.copy_rows(rows))
-        table = self._levels.for_rows(self._level_of_row[rows])
+        table = self._table_of(rows)
         progress = rewards.route_progress(part, table, self._position[rows])
         self._potential[rows] = self.config.reward_weights.progress * progress
 
@@ -301,7 +301,7 @@ class Simulation:
             state, table = self.state, self.table
         else:
             state = GameState(**self.state.copy_rows(rows))
-            table = self._levels.for_rows(self._level_of_row[rows])
+            table = self._table_of(rows)
         ball = observations.BallState(
             position=self._position[every],
             velocity=self._velocity[every],
@@ -366,11 +366,26 @@ class Simulation:
             self._generators[row].bit_generator.state = generator
         self._measure_potential(rows)
 
+    def _table_of(self, rows: Int64) -> LevelTable:
+        """Return the level data of ``rows``.
+
+        Games that play one level differ in nothing there, and views of it for as many rows are
+        kept: making one costs as much as all else in a reset.
+        """
+        if len(self._levels.start) > 1:
+            return self._levels.for_rows(self._level_of_row[rows])
+        count = len(rows)
+        if count not in self._views:
+            self._views[count] = self._levels.for_rows(self._level_of_row[rows])
+        return self._views[count]
+
     def _checked(self, rows: Int64) -> Int64:
         """Return ``rows`` as indices if they are different row numbers; a mask is not."""
         rows = np.asarray(rows)
-        inside = np.isin(rows, np.arange(self.num_envs))
-        if rows.dtype == np.bool_ or not inside.all() or len(np.unique(rows)) != len(rows):
+        numbers = range(self.num_envs)
+        found = rows.tolist()
+        wrong = rows.dtype == np.bool_ or any(row not in numbers for row in found)
+        if wrong or len(set(found)) != len(found):
             raise ValueError(
                 f"rows: found {rows.tolist()}; must be different row numbers from 0 to "
                 f"{self.num_envs - 1}"

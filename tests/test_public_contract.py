@@ -8,6 +8,8 @@ import sys
 
 import pytest
 
+import roller_env
+
 HEAVY = ("mujoco", "torch", "stable_baselines3", "pydantic", "matplotlib")
 
 
@@ -27,3 +29,11 @@ def test_importing_the_package_registers_its_ids_and_loads_nothing_heavy() -> No
 def test_gymnasiums_environments_need_no_training_library_and_no_opengl(module: str) -> None:
     loaded = modules_after(f"import {module} as module")
     assert loaded.isdisjoint({"torch", "stable_baselines3", "matplotlib", "OpenGL", "mujoco.egl"})
+
+
+def test_the_package_run_as_a_program_plays_every_level_and_says_with_what() -> None:
+    command = [sys.executable, "-m", "roller_env"]
+    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert lines[0].startswith(f"Roller {roller_env.__version__}: Python ")
+    assert "mujoco 4." in lines[0]
+    assert lines[1].startswith("every level plays; ")

@@ -22,9 +22,8 @@ from roller_env.compile.scenery import (
     part,
     ring_count,
 )
-from roller_env.game.cameras import MODE_BELOW, MODE_FIRST_PERSON
+from roller_env.game.cameras import MODE_BELOW, MODE_FIRST_PERSON, TriggerKind
 from roller_env.game.state import GameState
-from roller_env.game.tables import TriggerKind
 from roller_env.level.expand import coin_positions
 from roller_env.level.schema import Level
 from roller_env.physics.presets import PhysicsPreset

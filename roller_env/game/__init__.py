@@ -1,1 +1,1 @@
-"""The rules of the game. Pure NumPy with a leading axis of environments."""
+"""The rules of the game: NumPy arrays with a leading axis of environments, loops by Numba."""

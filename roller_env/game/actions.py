@@ -55,7 +55,7 @@ def forces(mode: ActionMode, actions: npt.ArrayLike) -> Float64:
     """
     array = np.asarray(actions)
     if mode == "directions":
-        if array.ndim != 1 or not np.issubdtype(array.dtype, np.integer):
+        if array.ndim != 1 or array.dtype.kind not in "iu":
             raise ValueError(
                 f"actions: found shape {array.shape} of {array.dtype}; 'directions' takes (N,) "
                 "integers"

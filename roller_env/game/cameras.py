@@ -1,12 +1,15 @@
-"""Where the game's six cameras are and what they look at."""
+"""Where the game's six cameras are, what they look at, and when one takes over from another."""
 
 from __future__ import annotations
 
+import math
+from enum import IntEnum
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.game.compiled import compiled
 from roller_env.units import METRES_PER_QUANT, quants
 
 Float64 = npt.NDArray[np.float64]
@@ -22,6 +25,20 @@ MODE_FRONT: Final = 5
 
 MODES: Final = ("behind", "retreat", "overhead", "below", "first_person", "front")
 """Names of the camera modes, by number."""
+
+
+class TriggerKind(IntEnum):
+    """What a camera trigger does; see `roller_env.level.schema.CameraTrigger`."""
+
+    OVERHEAD = 0
+    RETREAT = 1
+    FIRST_PERSON = 2
+
+
+_OVERHEAD, _RETREAT, _FIRST_PERSON = (int(kind) for kind in TriggerKind)
+
+OVERHEAD_DELAY_S: Final = 100.0 / 60.0
+"""`flipcam` waits 100 frames, at the nominal 60 frames a second."""
 
 OFFSETS_M: Final = METRES_PER_QUANT * np.array(
     [
@@ -70,17 +87,116 @@ def retreat(mode: Int64, ball: Float64, camera_x: Float64, duration_s: float) ->
 
     Changes ``mode`` and ``camera_x``, both (N,), in place.
     """
-    retreating = mode == MODE_RETREAT
-    if not retreating.any():
-        return
-    camera_x[retreating] -= RETREAT_SPEED_M_S * duration_s
-    mode[retreating & (camera_x <= ball[:, 0] + OFFSETS_M[MODE_BEHIND, 0])] = MODE_BEHIND
+    for row in range(len(mode)):
+        _retreat(row, mode, ball, camera_x, duration_s)
+
+
+@compiled
+def _retreat(row: int, mode: Int64, ball: Float64, camera_x: Float64, duration_s: float) -> None:
+    if mode[row] == MODE_RETREAT:
+        camera_x[row] -= RETREAT_SPEED_M_S * duration_s
+        if camera_x[row] <= ball[row, 0] + OFFSETS_M[MODE_BEHIND, 0]:
+            mode[row] = MODE_BEHIND
+
+
+@compiled
+def move(
+    duration_s: float,
+    ball: Float64,
+    kind: Int64,
+    fired: Bool,
+    inside: Bool,
+    entry: Float64,
+    thrust_s: Float64,
+    spent: Bool,
+    delay_s: Float64,
+    mode: Int64,
+    camera_x: Float64,
+) -> None:
+    """Change the cameras as triggers, lift pads and timers say, after a step.
+
+    Changes ``spent``, ``delay_s``, ``mode`` and ``camera_x`` in place; they are those of
+    `roller_env.game.state.GameState`.
+
+    Args:
+        duration_s: of the step.
+        ball: (N, 3) where it ended, metres.
+        kind: (N, T) `TriggerKind`.
+        fired: (N, T) the triggers that the ball entered.
+        inside: (N, T) those that it is in.
+        entry: (N, T) when it entered, substeps.
+        thrust_s: (N, A) how much longer the lift pads push.
+        spent: (N, T) one-time triggers that are dead.
+        delay_s: (N, T) time until each trigger sets mode 2.
+        mode: (N,) camera modes.
+        camera_x: (N,) world x of cameras in mode 1, metres.
+    """
+    for row in range(len(mode)):
+        _retreat(row, mode, ball, camera_x, duration_s)
+        _wait_for_overhead(row, duration_s, delay_s, mode)
+        setting = _fire_triggers(row, kind, fired, inside, entry, spent, delay_s)
+        if setting >= 0 and kind[row, setting] == _RETREAT:
+            if mode[row] != MODE_RETREAT:
+                camera_x[row] = ball[row, 0] + OFFSETS_M[mode[row], 0]
+            mode[row] = MODE_RETREAT
+        elif setting >= 0:
+            mode[row] = MODE_FIRST_PERSON
+        # The original sets mode 0 in every frame of the push.
+        for pad in range(thrust_s.shape[1]):
+            if thrust_s[row, pad] > 0.0:
+                mode[row] = MODE_BEHIND
+
+
+@compiled
+def _wait_for_overhead(row: int, duration_s: float, delay_s: Float64, mode: Int64) -> None:
+    """Let the time run that `TriggerKind.OVERHEAD` waits, and change the mode at its end."""
+    for trigger in range(delay_s.shape[1]):
+        delay_s[row, trigger] -= duration_s
+        if delay_s[row, trigger] <= 1e-9:
+            mode[row] = MODE_OVERHEAD
+            delay_s[row, trigger] = np.inf
+
+
+@compiled
+def _fire_triggers(
+    row: int, kind: Int64, fired: Bool, inside: Bool, entry: Float64, spent: Bool, delay_s: Float64
+) -> int:
+    """Let a row's triggers act; return which of them sets the mode, or -1.
+
+    Where several do in one step, the latest counts. A first-person trigger acts all the time that
+    the ball is in it.
+    """
+    setting, latest = -1, -np.inf
+    for trigger in range(kind.shape[1]):
+        time = entry[row, trigger] if fired[row, trigger] else 0.0
+        acts = fired[row, trigger]
+        if kind[row, trigger] == _FIRST_PERSON:
+            acts = acts or inside[row, trigger]
+        elif acts and kind[row, trigger] == _OVERHEAD:
+            delay_s[row, trigger] = min(delay_s[row, trigger], OVERHEAD_DELAY_S)
+            acts = False
+        elif acts:
+            spent[row, trigger] = True
+        if acts and time >= latest:
+            setting, latest = trigger, time
+    return setting
 
 
 def follow_heading(heading: Float64, velocity: Float64) -> Float64:
     """Return the direction of motion, (N, 3), or the last one where the ball hardly moves."""
-    speed = np.sqrt((velocity * velocity).sum(axis=1))[:, None]
-    direction: Float64 = np.where(
-        speed > HEADING_SPEED_M_S, velocity / np.maximum(speed, HEADING_SPEED_M_S), heading
-    )
+    direction = np.empty(heading.shape)
+    _follow_heading(heading, velocity, direction)
     return direction
+
+
+@compiled
+def _follow_heading(heading: Float64, velocity: Float64, direction: Float64) -> None:
+    for row in range(len(heading)):
+        x, y, z = velocity[row, 0], velocity[row, 1], velocity[row, 2]
+        speed = math.sqrt(x * x + y * y + z * z)
+        if speed > HEADING_SPEED_M_S:
+            direction[row, 0] = x / speed
+            direction[row, 1] = y / speed
+            direction[row, 2] = z / speed
+        else:
+            direction[row] = heading[row]

@@ -13,6 +13,7 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.game.compiled import compiled
 from roller_env.game.state import GameState
 from roller_env.game.tables import Kind, LevelTable
 
@@ -134,7 +135,7 @@ _LAYOUT: Final = layout(STATE_ENTRIES)
 STATE_SIZE: Final = sum(entry.size for entry in STATE_ENTRIES)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(slots=True, eq=False)
 class BallState:
     """The moving bodies as MuJoCo has them, in arrays of rows.
 
@@ -164,98 +165,219 @@ def state_observation(
         table: the levels of the rows.
         max_steps: (N,) control steps after which an episode is cut off.
     """
-    n = len(ball.position)
-    out = np.zeros((n, STATE_SIZE), dtype=np.float32)
-    out[:, _LAYOUT["position"]] = ball.position
-    out[:, _LAYOUT["velocity"]] = ball.velocity
-    out[:, _LAYOUT["angular_velocity"]] = rotate(ball.orientation, ball.spin)
-    _show_coins(out, ball.position, state, table)
-    unstruck = table.exists(Kind.PLATE) & ~state.plate_struck
-    _show_nearest(out, "plate", ball.position, table.centres(Kind.PLATE), unstruck)
-    out[:, _LAYOUT["plate_sinking"]] = (state.plate_struck & ~state.plate_down).any(
-        axis=1, keepdims=True
+    out = np.zeros((len(ball.position), STATE_SIZE), dtype=np.float32)
+    pads, finish = table.centres(Kind.LIFT_PAD), table.centres(Kind.FINISH)
+    _show_ball(
+        ball.position,
+        ball.velocity,
+        ball.orientation,
+        ball.spin,
+        finish,
+        state.thrust_s,
+        state.steps,
+        max_steps,
+        out,
     )
-    _show_gate(out, ball, table)
-    pads = table.exists(Kind.LIFT_PAD)
-    _show_nearest(out, "pad", ball.position, table.centres(Kind.LIFT_PAD), pads)
-    out[:, _LAYOUT["thrust_left"]] = state.thrust_s.max(axis=1, initial=0.0)[:, None]
-    out[:, _LAYOUT["finish"]] = table.centres(Kind.FINISH)[:, 0] - ball.position
-    out[:, _LAYOUT["time_left"]] = np.maximum(1.0 - state.steps / max_steps, 0.0)[:, None]
+    _show_coins(
+        ball.position,
+        table.coin_at,
+        table.coin_order,
+        table.coin_x,
+        table.coin_count,
+        state.coin_taken,
+        state.points,
+        out,
+    )
+    _show_plates(
+        ball.position,
+        table.centres(Kind.PLATE),
+        table.exists(Kind.PLATE),
+        state.plate_struck,
+        state.plate_down,
+        out,
+    )
+    _show_gates(ball.position, ball.gate, table.gate_centre, table.gate_stop, out)
+    _show_pads(ball.position, pads, table.exists(Kind.LIFT_PAD), out)
     return out
 
 
-def _show_coins(out: Float32, ball: Float64, state: GameState, table: LevelTable) -> None:
-    left = table.exists(Kind.COIN) & ~state.coin_taken
-    width = left.shape[1]
-    if width == 0:
-        return
-    out[:, _LAYOUT["coins_left"]] = (left.sum(axis=1) / np.maximum(table.coin_count, 1))[:, None]
-    x, y, z = (coin - at[:, None] for coin, at in zip(table.coin_planes, ball.T, strict=True))
-    distance = x * x + y * y + z * z
-    distance[~left] = np.inf
-    shown = min(NEAREST_COINS, width)
-    rows = np.arange(len(ball))[:, None]
-    if width > NEAREST_COINS:
-        nearest = np.argpartition(distance, shown - 1, axis=1)[:, :shown]
-        # argpartition leaves the nearest few in no order; equal distances go by number.
-        nearest.sort(axis=1)
-        nearest = nearest[rows, np.argsort(distance[rows, nearest], axis=1, kind="stable")]
-    else:
-        nearest = np.argsort(distance, axis=1, kind="stable")
-    present = left[rows, nearest]
-    vectors = np.stack([axis[rows, nearest] for axis in (x, y, z)], axis=2) * present[..., None]
-    begin = _LAYOUT["coins"].start
-    out[:, begin : begin + 3 * shown] = vectors.reshape(len(ball), -1)
-    begin = _LAYOUT["coins_present"].start
-    out[:, begin : begin + shown] = present
+_ANGULAR_VELOCITY: Final = _LAYOUT["angular_velocity"].start
+_COINS_LEFT: Final = _LAYOUT["coins_left"].start
+_COINS: Final = _LAYOUT["coins"].start
+_COINS_PRESENT: Final = _LAYOUT["coins_present"].start
+_PLATE: Final = _LAYOUT["plate"].start
+_PLATE_PRESENT: Final = _LAYOUT["plate_present"].start
+_PLATE_SINKING: Final = _LAYOUT["plate_sinking"].start
+_GATE: Final = _LAYOUT["gate"].start
+_GATE_PRESENT: Final = _LAYOUT["gate_present"].start
+_GATE_LOWERED: Final = _LAYOUT["gate_lowered"].start
+_PAD: Final = _LAYOUT["pad"].start
+_PAD_PRESENT: Final = _LAYOUT["pad_present"].start
+_THRUST_LEFT: Final = _LAYOUT["thrust_left"].start
+_FINISH: Final = _LAYOUT["finish"].start
+_TIME_LEFT: Final = _LAYOUT["time_left"].start
+_POSITION: Final = _LAYOUT["position"].start
+_VELOCITY: Final = _LAYOUT["velocity"].start
 
 
-def _show_nearest(
-    out: Float32, name: str, ball: Float64, centres: Float64, candidates: Bool
-) -> Int64:
-    """Write the vector to the nearest candidate and whether there is one; return its index."""
-    if candidates.shape[1] == 0:
-        return np.zeros(len(ball), dtype=np.int64)
-    if candidates.shape[1] == 1:
-        # Most levels have one of each, and nothing to choose from.
-        nearest = np.zeros(len(ball), dtype=np.int64)
-        present, vectors = candidates[:, 0], centres[:, 0] - ball
-    else:
-        relative = centres - ball[:, None, :]
-        distance = np.where(candidates, np.einsum("nki,nki->nk", relative, relative), np.inf)
-        nearest, rows = distance.argmin(axis=1), np.arange(len(ball))
-        present, vectors = candidates[rows, nearest], relative[rows, nearest]
-    out[:, _LAYOUT[name]] = np.where(present[:, None], vectors, 0.0)
-    out[:, _LAYOUT[f"{name}_present"]] = present[:, None]
-    return nearest
+@compiled
+def _show_ball(
+    position: Float64,
+    velocity: Float64,
+    orientation: Float64,
+    spin: Float64,
+    finish: Float64,
+    thrust_s: Float64,
+    steps: Int64,
+    max_steps: Int64,
+    out: Float32,
+) -> None:
+    """Write what is shown of the ball itself, its way to the finish and its time."""
+    for row in range(len(out)):
+        for axis in range(3):
+            out[row, _POSITION + axis] = position[row, axis]
+            out[row, _VELOCITY + axis] = velocity[row, axis]
+            out[row, _FINISH + axis] = finish[row, 0, axis] - position[row, axis]
+        turned = rotated(orientation[row], spin[row])
+        out[row, _ANGULAR_VELOCITY] = turned[0]
+        out[row, _ANGULAR_VELOCITY + 1] = turned[1]
+        out[row, _ANGULAR_VELOCITY + 2] = turned[2]
+        for pad in range(thrust_s.shape[1]):
+            out[row, _THRUST_LEFT] = max(out[row, _THRUST_LEFT], np.float32(thrust_s[row, pad]))
+        out[row, _TIME_LEFT] = max(1.0 - steps[row] / max_steps[row], 0.0)
 
 
-def _show_gate(out: Float32, ball: BallState, table: LevelTable) -> None:
-    if ball.gate.shape[1] == 0:
-        return
-    real = table.gate_stop < 0.0
-    lowered = np.clip(ball.gate / np.where(real, table.gate_stop, -1.0), 0.0, 1.0)
-    centres = table.gate_centre.copy()
-    centres[..., 2] += ball.gate
-    shut = real & (ball.gate > table.gate_stop)
-    nearest = _show_nearest(out, "gate", ball.position, centres, shut)
-    rows = np.arange(len(lowered))
-    out[:, _LAYOUT["gate_lowered"]] = (lowered * shut)[rows, nearest][:, None]
+@compiled
+def _show_coins(
+    ball: Float64,
+    coin_at: Float64,
+    coin_order: Int64,
+    coin_x: Float64,
+    coin_count: Int64,
+    taken: Bool,
+    points: Int64,
+    out: Float32,
+) -> None:
+    """Write the nearest coins left, nearest first; equal distances go by number.
+
+    The coins lie in the order of their x. The search goes outwards from the ball and ends where x
+    alone is further than the last of the nearest.
+    """
+    nearest = np.empty(NEAREST_COINS, dtype=np.int64)
+    distance2 = np.empty(NEAREST_COINS)
+    for row in range(len(out)):
+        count = coin_count[row]
+        if count == 0:
+            continue
+        out[row, _COINS_LEFT] = (count - points[row]) / count
+        distance2[:] = np.inf
+        nearest[:] = count
+        right = np.searchsorted(coin_x[row, :count], ball[row, 0])
+        left = right - 1
+        while left >= 0 or right < count:
+            back = ball[row, 0] - coin_x[row, left] if left >= 0 else np.inf
+            ahead = coin_x[row, right] - ball[row, 0] if right < count else np.inf
+            if min(back, ahead) ** 2 > distance2[-1]:
+                break
+            place = left if back <= ahead else right
+            left -= back <= ahead
+            right += back > ahead
+            coin = coin_order[row, place]
+            if not taken[row, coin]:
+                _keep_nearest(coin, _distance2(coin_at[row, coin], ball[row]), nearest, distance2)
+        for place in range(NEAREST_COINS):
+            if nearest[place] < count:
+                out[row, _COINS_PRESENT + place] = 1.0
+                _show_vector(out[row], _COINS + 3 * place, coin_at[row, nearest[place]], ball[row])
 
 
-def rotate(quaternion: Float64, vector: Float64) -> Float64:
-    """Return vectors, (N, 3), rotated by unit quaternions (w, x, y, z), (N, 4)."""
-    w, x, y, z = quaternion.T
-    a, b, c = vector.T
-    # Twice the cross product of the quaternion's axis and the vector; numpy.cross takes 5 times
-    # as long on a single vector.
+@compiled
+def _keep_nearest(coin: int, new2: float, nearest: Int64, distance2: Float64) -> None:
+    """Put a coin into its place among the nearest, if it is one of them."""
+    place = NEAREST_COINS
+    while place > 0 and (
+        new2 < distance2[place - 1] or (new2 == distance2[place - 1] and coin < nearest[place - 1])
+    ):
+        place -= 1
+        if place < NEAREST_COINS - 1:
+            distance2[place + 1], nearest[place + 1] = distance2[place], nearest[place]
+    if place < NEAREST_COINS:
+        distance2[place], nearest[place] = new2, coin
+
+
+@compiled
+def _show_plates(
+    ball: Float64, centre: Float64, real: Bool, struck: Bool, down: Bool, out: Float32
+) -> None:
+    """Write the nearest plate not yet struck, and whether any is sinking."""
+    for row in range(len(out)):
+        best, best2 = -1, np.inf
+        for plate in range(struck.shape[1]):
+            if struck[row, plate] and not down[row, plate]:
+                out[row, _PLATE_SINKING] = 1.0
+            new2 = _distance2(centre[row, plate], ball[row])
+            if real[row, plate] and not struck[row, plate] and new2 < best2:
+                best, best2 = plate, new2
+        if best >= 0:
+            out[row, _PLATE_PRESENT] = 1.0
+            _show_vector(out[row], _PLATE, centre[row, best], ball[row])
+
+
+@compiled
+def _show_gates(
+    ball: Float64, displacement: Float64, centre: Float64, stop: Float64, out: Float32
+) -> None:
+    """Write the nearest gate not yet open, where it is now, and how far it has gone."""
+    at = np.empty(3)
+    for row in range(len(out)):
+        best2 = np.inf
+        for gate in range(displacement.shape[1]):
+            moved = displacement[row, gate]
+            at[:] = centre[row, gate]
+            at[2] += moved
+            new2 = _distance2(at, ball[row])
+            # Padding has no way to go: its stop is 0.
+            if stop[row, gate] < 0.0 and moved > stop[row, gate] and new2 < best2:
+                best2 = new2
+                out[row, _GATE_PRESENT] = 1.0
+                out[row, _GATE_LOWERED] = min(max(moved / stop[row, gate], 0.0), 1.0)
+                _show_vector(out[row], _GATE, at, ball[row])
+
+
+@compiled
+def _show_pads(ball: Float64, centre: Float64, real: Bool, out: Float32) -> None:
+    """Write the nearest lift pad."""
+    for row in range(len(out)):
+        best2 = np.inf
+        for pad in range(real.shape[1]):
+            new2 = _distance2(centre[row, pad], ball[row])
+            if real[row, pad] and new2 < best2:
+                best2 = new2
+                out[row, _PAD_PRESENT] = 1.0
+                _show_vector(out[row], _PAD, centre[row, pad], ball[row])
+
+
+@compiled
+def _distance2(point: Float64, ball: Float64) -> float:
+    x, y, z = point[0] - ball[0], point[1] - ball[1], point[2] - ball[2]
+    squared: float = x * x + y * y + z * z
+    return squared
+
+
+@compiled
+def _show_vector(out: Float32, begin: int, point: Float64, ball: Float64) -> None:
+    for axis in range(3):
+        out[begin + axis] = point[axis] - ball[axis]
+
+
+@compiled
+def rotated(quaternion: Float64, vector: Float64) -> tuple[float, float, float]:
+    """Return a vector, (3,), rotated by a unit quaternion (w, x, y, z)."""
+    w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    a, b, c = vector[0], vector[1], vector[2]
+    # Twice the cross product of the quaternion's axis and the vector.
     p, q, r = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
-    rotated = (
-        a + w * p + (y * r - z * q),
-        b + w * q + (z * p - x * r),
-        c + w * r + (x * q - y * p),
-    )
-    return np.stack(rotated, axis=1)
+    return a + w * p + (y * r - z * q), b + w * q + (z * p - x * r), c + w * r + (x * q - y * p)
 
 
 def ray_directions() -> Float64:

@@ -10,11 +10,13 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.game.rules import Events
+from roller_env.game.compiled import compiled
 from roller_env.game.state import GameState
+from roller_env.game.sweep import Events
 from roller_env.game.tables import LevelTable
 
 Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
 RewardMode = Literal["points", "shaped"]
 
 
@@ -46,7 +48,7 @@ class RewardWeights:
 def points_reward(events: Events, weights: RewardWeights) -> Float64:
     """Return the points, (N,), of a step's events: coins, finish, fall."""
     points: Float64 = (
-        weights.coin * events.coins.sum(axis=1)
+        weights.coin * events.points
         + weights.finish * events.finished
         + weights.fall * events.fallen
     )
@@ -59,19 +61,33 @@ def follow_route(state: GameState, table: LevelTable, ball: Float64) -> None:
     A leg is reached when the ball is within the route's radius of it. Legs that the ball has
     jumped over count as passed: a waypoint missed in flight must not draw it back.
     """
-    x, y, z = (
-        position[:, None] - start for position, start in zip(ball.T, table.leg_start, strict=True)
-    )
-    if x.shape[1] == 0:
-        return
-    way_x, way_y, way_z = table.leg_way
+    _follow_route(ball, table.route, table.route_length, table.route_radius, state.waypoint)
+
+
+@compiled
+def _follow_route(
+    ball: Float64, route: Float64, length: Int64, radius: Float64, waypoint: Int64
+) -> None:
+    for row in range(len(ball)):
+        x, y, z = ball[row, 0], ball[row, 1], ball[row, 2]
+        # The furthest leg counts, and the legs up to the next waypoint are behind already.
+        for leg in range(length[row] - 1, waypoint[row], -1):
+            start, end = route[row, leg - 1], route[row, leg]
+            if _distance2(x, y, z, start, end) <= radius[row] * radius[row]:
+                waypoint[row] = leg
+                break
+
+
+@compiled
+def _distance2(x: float, y: float, z: float, start: Float64, end: Float64) -> float:
+    """Return the squared distance of a point to the piece from ``start`` to ``end``."""
+    way_x, way_y, way_z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+    x, y, z = x - start[0], y - start[1], z - start[2]
     length2 = way_x * way_x + way_y * way_y + way_z * way_z
-    share = (x * way_x + y * way_y + z * way_z) / np.maximum(length2, 1e-12)
-    np.clip(share, 0.0, 1.0, out=share)
-    distance2 = (x - share * way_x) ** 2 + (y - share * way_y) ** 2 + (z - share * way_z) ** 2
-    reached = distance2 <= table.route_radius[:, None] ** 2
-    furthest = np.where(reached, np.arange(1, x.shape[1] + 1), 0).max(axis=1)
-    state.waypoint = np.maximum(state.waypoint, furthest)
+    share = (x * way_x + y * way_y + z * way_z) / max(length2, 1e-12)
+    share = min(max(share, 0.0), 1.0)
+    x, y, z = x - share * way_x, y - share * way_y, z - share * way_z
+    return x * x + y * y + z * z
 
 
 def route_progress(state: GameState, table: LevelTable, ball: Float64) -> Float64:
@@ -79,15 +95,29 @@ def route_progress(state: GameState, table: LevelTable, ball: Float64) -> Float6
 
     It is the arc length up to the next waypoint less the straight distance to it.
     """
-    if table.route.shape[1] < 2:
-        return np.zeros(len(ball))
-    rows = np.arange(len(ball))
-    last = np.maximum(table.route_length - 1, 0)
-    next_point = table.route[rows, state.waypoint]
-    distance = np.sqrt(((next_point - ball) ** 2).sum(axis=1))
-    behind = table.route_arc[rows, state.waypoint] - distance
-    total = table.route_arc[rows, last]
-    return np.where(total > 0.0, np.clip(behind / np.maximum(total, 1e-12), 0.0, 1.0), 0.0)
+    progress = np.zeros(len(ball))
+    _route_progress(
+        ball, table.route, table.route_arc, table.route_length, state.waypoint, progress
+    )
+    return progress
+
+
+@compiled
+def _route_progress(
+    ball: Float64,
+    route: Float64,
+    arc: Float64,
+    length: Int64,
+    waypoint: Int64,
+    progress: Float64,
+) -> None:
+    for row in range(len(ball)):
+        total = arc[row, length[row] - 1] if length[row] > 1 else 0.0
+        if total > 0.0:
+            goal = route[row, waypoint[row]]
+            x, y, z = goal[0] - ball[row, 0], goal[1] - ball[row, 1], goal[2] - ball[row, 2]
+            behind = arc[row, waypoint[row]] - math.sqrt(x * x + y * y + z * z)
+            progress[row] = min(max(behind / total, 0.0), 1.0)
 
 
 def shaping(

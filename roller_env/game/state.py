@@ -23,6 +23,7 @@ class GameState:
         steps: (N,) control steps since the episode began.
         control_delay_s: (N,) time until the keys work (the intro).
         coin_taken: (N, K) which coins are collected.
+        points: (N,) how many.
         touching: (N, M) which regions the ball was in at the end of the last step.
         plate_struck: (N, P) which plates are sinking or down.
         plate_down: (N, P) which plates have arrived.
@@ -43,6 +44,7 @@ class GameState:
     steps: Int64
     control_delay_s: Float64
     coin_taken: Bool
+    points: Int64
     touching: Bool
     plate_struck: Bool
     plate_down: Bool
@@ -72,7 +74,8 @@ class GameState:
         return GameState(
             steps=np.zeros(n, dtype=np.int64),
             control_delay_s=np.zeros(n),
-            coin_taken=flags(table.width(Kind.COIN)),
+            coin_taken=flags(table.coin_at.shape[1]),
+            points=np.zeros(n, dtype=np.int64),
             touching=flags(table.region_radius.shape[1]),
             plate_struck=flags(table.width(Kind.PLATE)),
             plate_down=flags(table.width(Kind.PLATE)),
@@ -99,12 +102,6 @@ class GameState:
     def over(self) -> Bool:
         """(N,) whether the episode has ended, also by time."""
         return self.terminated | self.truncated
-
-    @property
-    def points(self) -> Int64:
-        """(N,) coins collected."""
-        points: Int64 = self.coin_taken.sum(axis=1)
-        return points
 
     def copy_rows(self, rows: Int64 | slice = slice(None)) -> dict[str, npt.NDArray[Any]]:
         """Return copies of the rows' arrays by name."""

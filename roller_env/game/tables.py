@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.game.cameras import TriggerKind
 from roller_env.level.expand import coin_positions
 from roller_env.level.schema import PLATE_HIT_HEIGHT_M, Level
 from roller_env.units import quants
@@ -34,21 +35,16 @@ FAR_M: Final = 1e12
 
 
 class Kind(IntEnum):
-    """Kinds of regions, in the order in which events at the same moment are taken."""
+    """Kinds of regions, in the order in which events at the same moment are taken.
 
-    COIN = 0
-    PLATE = 1
-    LIFT_PAD = 2
-    TRIGGER = 3
-    FINISH = 4
+    Coins come before all of them; they are found by their own table, since a level may have
+    thousands.
+    """
 
-
-class TriggerKind(IntEnum):
-    """What a camera trigger does; see `roller_env.level.schema.CameraTrigger`."""
-
-    OVERHEAD = 0
-    RETREAT = 1
-    FIRST_PERSON = 2
+    PLATE = 0
+    LIFT_PAD = 1
+    TRIGGER = 2
+    FINISH = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +61,6 @@ class LevelTable:
     region_half: Float64  # (L, M, 3)
     region_radius: Float64  # (L, M)
     region_floor: Float64  # (L, M)
-    region_low: Float64  # (L, 3, M) bounding boxes' corners
-    region_high: Float64  # (L, 3, M)
     region_real: Bool  # (L, M) no padding
     ball_radius: Float64  # (L,)
     kill_height: Float64  # (L,)
@@ -74,7 +68,9 @@ class LevelTable:
     start: Float64  # (L, 3)
     jitter: Float64  # (L, 2)
     coin_count: Int64  # (L,)
-    coin_planes: tuple[Float64, Float64, Float64]  # x, y and z of the coins apart, each (L, K)
+    coin_at: Float64  # (L, K, 3)
+    coin_order: Int64  # (L, K) the coins' numbers in the order of their x
+    coin_x: Float64  # (L, K) the coins' x in that order
     plate_stop: Float64  # (L, P) displacement at which a plate is down, <= 0
     plate_speed: Float64  # (L, P)
     plate_opens: Bool  # (L, P, G)
@@ -86,8 +82,6 @@ class LevelTable:
     trigger_kind: Int64  # (L, T)
     route: Float64  # (L, W, 3)
     route_arc: Float64  # (L, W) metres along the route up to each waypoint
-    leg_start: tuple[Float64, Float64, Float64]  # from waypoint to waypoint: x, y, z, (L, W - 1)
-    leg_way: tuple[Float64, Float64, Float64]  # to the next waypoint, each (L, W - 1)
     route_radius: Float64  # (L,)
     route_length: Int64  # (L,) number of waypoints, 0 for none
 
@@ -120,8 +114,12 @@ class LevelTable:
                     result[index, : len(row)] = row
             return result
 
-        reach = region[..., 3:6] + region[..., 6:7]
-        low, high = region[..., :3] - reach, region[..., :3] + reach
+        coins = [coin_positions(level)[0] for level in levels]
+        coin_at = np.full((count, max(map(len, coins)), 3), FAR_M)
+        for places, own in zip(coin_at, coins, strict=True):
+            places[: len(own)] = np.reshape(own, (-1, 3))
+        # Stable: coins of one x stay in the order of their numbers, padding behind all.
+        coin_order = np.argsort(coin_at[..., 0], axis=1, kind="stable")
 
         gates = max(len(level.gates) for level in levels)
         routes = [
@@ -133,16 +131,16 @@ class LevelTable:
             region_half=region[..., 3:6],
             region_radius=region[..., 6],
             region_floor=region[..., 7],
-            region_low=np.ascontiguousarray(low.transpose(0, 2, 1)),
-            region_high=np.ascontiguousarray(high.transpose(0, 2, 1)),
             region_real=region[..., 0] < FAR_M,
             ball_radius=np.array([level.ball.radius for level in levels]),
             kill_height=np.array([level.kill_height for level in levels]),
             time_limit_s=np.array([level.time_limit_s for level in levels]),
             start=np.array([level.start.at for level in levels]),
             jitter=np.array([level.start.jitter for level in levels]),
-            coin_count=np.array([len(part[Kind.COIN]) for part in parts]),
-            coin_planes=_planes(region[:, slices[Kind.COIN], :3]),
+            coin_count=np.array([len(own) for own in coins]),
+            coin_at=coin_at,
+            coin_order=coin_order,
+            coin_x=np.take_along_axis(coin_at[..., 0], coin_order, axis=1),
             plate_stop=pad(lambda level: [p.sinks_to - p.at[2] for p in level.plates]),
             plate_speed=pad(lambda level: [p.speed for p in level.plates]),
             plate_opens=pad(lambda level: _opens(level, gates), (gates,)) > 0.0,
@@ -156,8 +154,6 @@ class LevelTable:
             ).astype(np.int64),
             route=pad(lambda level: level.route.points if level.route else [], (3,)),
             route_arc=_padded_arcs(routes),
-            leg_start=_planes(_padded_legs([route[:-1] for route in routes], FAR_M)),
-            leg_way=_planes(_padded_legs([np.diff(route, axis=0) for route in routes], 0.0)),
             route_radius=np.array([level.route.radius if level.route else 0.0 for level in levels]),
             route_length=np.array([len(route) for route in routes]),
         )
@@ -169,8 +165,6 @@ class LevelTable:
         """
 
         def choose(array: Any) -> Any:
-            if isinstance(array, tuple):
-                return tuple(choose(part) for part in array)
             if len(self.start) == 1:
                 return np.broadcast_to(array, (len(level_of_row), *array.shape[1:]))
             return array[level_of_row]
@@ -200,9 +194,7 @@ def _regions(level: Level) -> dict[Kind, Float64]:
         return [*at, *(edge / 2 for edge in size), radius, floor]
 
     point = (0.0, 0.0, 0.0)
-    coins, _ = coin_positions(level)
     rows = {
-        Kind.COIN: [row(at, point, COIN_REACH_M) for at in coins],
         Kind.PLATE: [row(p.at, p.size, touch, PLATE_HIT_HEIGHT_M) for p in level.plates],
         Kind.LIFT_PAD: [row(p.at, p.size, touch) for p in level.lift_pads],
         Kind.TRIGGER: [
@@ -214,24 +206,10 @@ def _regions(level: Level) -> dict[Kind, Float64]:
     return {kind: np.array(values).reshape(-1, 8) for kind, values in rows.items()}
 
 
-def _planes(array: Float64) -> tuple[Float64, Float64, Float64]:
-    """Return x, y and z of (L, n, 3) as contiguous arrays, for sums over all n."""
-    x, y, z = (np.ascontiguousarray(array[..., axis]) for axis in range(3))
-    return x, y, z
-
-
 def _opens(level: Level, gates: int) -> list[list[float]]:
     names = [gate.name for gate in level.gates]
     padding = [0.0] * (gates - len(names))
     return [[float(name in plate.opens) for name in names] + padding for plate in level.plates]
-
-
-def _padded_legs(legs: Sequence[Float64], padding: float) -> Float64:
-    """Return (L, W - 1, 3): the legs of each route, and ``padding`` behind its end."""
-    padded = np.full((len(legs), max(len(leg) for leg in legs), 3), padding)
-    for row, leg in zip(padded, legs, strict=True):
-        row[: len(leg)] = leg
-    return padded
 
 
 def _padded_arcs(routes: Sequence[Float64]) -> Float64:

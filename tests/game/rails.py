@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from roller_env.game import rules
+from roller_env.game import rules, sweep
 from roller_env.game.state import GameState
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level
@@ -31,7 +31,7 @@ class Rails:
         self.plate = np.zeros(self.table.plate_stop.shape)
         self._ball = self.table.start.copy()
 
-    def follow(self, path: Float64, velocity: Float64 | None = None) -> rules.Events:
+    def follow(self, path: Float64, velocity: Float64 | None = None) -> sweep.Events:
         """Let one control step pass on a path, (N, S + 1, 3) metres; struck plates sink."""
         if velocity is None:
             velocity = (path[:, -1] - path[:, -2]) * (path.shape[1] - 1) / self.step_s
@@ -40,14 +40,14 @@ class Rails:
         self.plate = np.maximum(
             self.plate + controls.plate_velocity * self.step_s, self.table.plate_stop
         )
-        motion = rules.Motion(path, self.plate, velocity, self.step_s)
-        events = rules.find_events(self.state, self.table, motion)
+        motion = sweep.Motion(path, self.plate, velocity, self.step_s)
+        events = sweep.find_events(self.state, self.table, motion)
         rules.apply(self.state, self.table, motion, events)
         self._ball = path[:, -1].copy()
         self.time_s += self.step_s
         return events
 
-    def go(self, *points: Vector | Sequence[float]) -> rules.Events:
+    def go(self, *points: Vector | Sequence[float]) -> sweep.Events:
         """Move every ball along straight pieces from where it is in one control step."""
         way = [self._ball, *(np.broadcast_to(point, self._ball.shape) for point in points)]
         return self.follow(np.stack(way, axis=1).astype(np.float64))

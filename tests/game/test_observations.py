@@ -24,7 +24,7 @@ from roller_env.game.observations import (
     entries,
     layout,
     ray_directions,
-    rotate,
+    rotated,
     scan_offsets,
     split,
 )
@@ -103,19 +103,13 @@ def test_the_spin_is_shown_in_the_worlds_frame() -> None:
     hnp.arrays(np.float64, 4, elements=st.floats(-1, 1)).filter(lambda a: np.linalg.norm(a) > 0.1),
     hnp.arrays(np.float64, 3, elements=st.floats(-50, 50)),
 )
-def test_rotate_is_mujocos(quaternion: np.ndarray, vector: np.ndarray) -> None:
+def test_vectors_are_rotated_as_mujoco_rotates_them(
+    quaternion: np.ndarray, vector: np.ndarray
+) -> None:
     quaternion = quaternion / np.linalg.norm(quaternion)
     expected = np.empty(3)
     mujoco.mju_rotVecQuat(expected, vector, quaternion)
-    np.testing.assert_allclose(rotate(quaternion[None], vector[None])[0], expected, atol=1e-12)
-
-
-def test_rotate_turns_every_row_by_its_own_quaternion() -> None:
-    half = np.sqrt(0.5)
-    quaternions = np.array([[1.0, 0, 0, 0], [half, 0, 0, half], [0, 1.0, 0, 0]])
-    vectors = np.tile([1.0, 2.0, 3.0], (3, 1))
-    expected = [[1.0, 2.0, 3.0], [-2.0, 1.0, 3.0], [1.0, -2.0, -3.0]]
-    np.testing.assert_allclose(rotate(quaternions, vectors), expected, atol=1e-12)
+    np.testing.assert_allclose(rotated(quaternion, vector), expected, atol=1e-12)
 
 
 # Coins --------------------------------------------------------------------------------------------

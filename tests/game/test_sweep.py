@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from roller_env.game import sweep
+from roller_env.game.state import GameState
 from roller_env.game.sweep import find_entries
 from roller_env.game.tables import COIN_REACH_M, Kind, LevelTable
 from roller_env.level import Level
@@ -68,7 +70,6 @@ def regions(draw: st.DrawFn) -> LevelTable:
     at = points(4.0)
     plates = st.fixed_dictionaries({"at": at, "size": sizes})
     return table_of(
-        coins=some(st.fixed_dictionaries({"at": at})),
         plates=[plate | {"name": f"p{i}", "opens": ["g"]} for i, plate in enumerate(some(plates))],
         lift_pads=some(st.fixed_dictionaries({"at": at, "size": sizes})),
         camera_triggers=some(
@@ -126,6 +127,8 @@ def is_a_visit_between_samples(path: Float64, table: LevelTable, index: int, tim
 
 
 COIN_AT = (10.0, 0.0, 0.0)
+SPHERE = {"at": COIN_AT, "kind": "first_person", "reach": COIN_REACH_M}
+"""A region of a coin's place and shape, whose moment of entry can be asked for."""
 
 
 def straight(start: Vector, end: Vector, substeps: int = 12) -> Float64:
@@ -134,8 +137,8 @@ def straight(start: Vector, end: Vector, substeps: int = 12) -> Float64:
 
 @pytest.mark.parametrize("speed_m_s", [1.0, 30.0, 200.0, 3000.0])
 @pytest.mark.parametrize("substeps", [1, 3, 12, 48])
-def test_no_speed_and_no_frame_skip_jumps_over_a_coin(speed_m_s: float, substeps: int) -> None:
-    table = table_of(coins=[{"at": COIN_AT}])
+def test_no_speed_and_no_frame_skip_jumps_over_a_region(speed_m_s: float, substeps: int) -> None:
+    table = table_of(camera_triggers=[SPHERE])
     way = speed_m_s * substeps * SUBSTEP_S
     start = 10.0 - COIN_REACH_M - 0.3 * way
     path = straight((start, 0.0, 0.0), (start + way, 0.0, 0.0), substeps)
@@ -144,10 +147,10 @@ def test_no_speed_and_no_frame_skip_jumps_over_a_coin(speed_m_s: float, substeps
 
 
 @pytest.mark.parametrize(("miss_m", "meets"), [(-1e-6, True), (1e-6, False)])
-def test_a_ball_that_grazes_a_coin_takes_it_and_one_that_just_misses_does_not(
+def test_a_ball_that_grazes_a_region_enters_it_and_one_that_just_misses_does_not(
     miss_m: float, meets: bool
 ) -> None:
-    table = table_of(coins=[{"at": COIN_AT}])
+    table = table_of(camera_triggers=[SPHERE])
     aside = COIN_REACH_M + miss_m
     path = straight((0.0, aside, 0.0), (23.0, aside, 0.0), substeps=1)
     times, inside = entries(path, table)
@@ -169,14 +172,14 @@ def test_a_ball_that_grazes_the_corner_of_a_pad_touches_it() -> None:
 
 
 def test_a_ball_that_starts_inside_enters_at_once_if_it_was_not_there_before() -> None:
-    table = table_of(coins=[{"at": COIN_AT}])
+    table = table_of(camera_triggers=[SPHERE])
     times, inside = entries(straight((10.2, 0.0, 0.0), (10.3, 0.0, 0.0)), table)
     assert times[0] == 0.0
     assert inside[0]
 
 
 def test_a_ball_that_was_there_before_does_not_enter_again() -> None:
-    table = table_of(coins=[{"at": COIN_AT}])
+    table = table_of(camera_triggers=[SPHERE])
     count = table.region_radius.shape[1]
     touching = np.ones((1, count), dtype=bool)
     times, inside = entries(straight((10.2, 0.0, 0.0), (10.3, 0.0, 0.0)), table, touching)
@@ -185,7 +188,7 @@ def test_a_ball_that_was_there_before_does_not_enter_again() -> None:
 
 
 def test_a_ball_that_leaves_and_comes_back_in_one_step_enters_again() -> None:
-    table = table_of(coins=[{"at": COIN_AT}])
+    table = table_of(camera_triggers=[SPHERE])
     touching = np.ones((1, table.region_radius.shape[1]), dtype=bool)
     path = np.array([[10.0, 0, 0], [20.0, 0, 0], [10.0, 0, 0]])
     times, inside = entries(path, table, touching)
@@ -194,14 +197,14 @@ def test_a_ball_that_leaves_and_comes_back_in_one_step_enters_again() -> None:
 
 
 def test_the_first_of_several_entries_counts() -> None:
-    table = table_of(coins=[{"at": COIN_AT}])
+    table = table_of(camera_triggers=[SPHERE])
     path = np.array([[0.0, 0, 0], [20.0, 0, 0], [0.0, 0, 0], [20.0, 0, 0]])
     times, _ = entries(path, table)
     assert times[0] == pytest.approx((10.0 - COIN_REACH_M) / 20.0)
 
 
 def test_a_region_that_is_not_live_is_not_entered() -> None:
-    table = table_of(coins=[{"at": COIN_AT}])
+    table = table_of(camera_triggers=[SPHERE])
     live = np.zeros((1, table.region_radius.shape[1]), dtype=bool)
     path = straight((0.0, 0.0, 0.0), (20.0, 0.0, 0.0))[None]
     times, inside = find_entries(path, table, live.copy(), live)
@@ -228,7 +231,7 @@ def test_rows_are_swept_each_for_itself() -> None:
                     "name": "one",
                     "start": {"at": (0.0, 0.0, 0.0)},
                     "finish": {"at": (900.0, 0.0, 0.0), "size": (1.0, 1.0, 1.0)},
-                    "coins": [{"at": COIN_AT}],
+                    "camera_triggers": [SPHERE],
                 }
             )
         ]
@@ -244,3 +247,46 @@ def test_rows_are_swept_each_for_itself() -> None:
     times, _ = find_entries(path, table, none, ~none)
     reach = (10.0 - COIN_REACH_M) / 20.0 * 12
     np.testing.assert_allclose(times[:, 0], [reach, np.inf, reach])
+
+
+# Coins --------------------------------------------------------------------------------------------
+
+crowded = st.tuples(*[st.integers(-6, 6).map(lambda place: place / 2)] * 3)
+"""Places on a grid, so that many coins share an x."""
+
+
+def collect(path: Float64, table: LevelTable, taken: np.ndarray | None = None) -> sweep.Events:
+    state = GameState.initial(table)
+    if taken is not None:
+        state.coin_taken[0] = taken
+    plate = np.zeros((1, table.width(Kind.PLATE)))
+    return sweep.find_events(state, table, sweep.Motion(path[None], plate, np.zeros((1, 3)), 0.05))
+
+
+@settings(deadline=None)
+@given(st.lists(crowded, min_size=1, max_size=40), paths(), st.data())
+def test_the_coins_taken_are_those_whose_own_region_is_entered(
+    places: list[Vector], path: Float64, data: st.DataObject
+) -> None:
+    """However they lie, and whichever of them are gone already."""
+    sphere = {"kind": "first_person", "reach": COIN_REACH_M}
+    spheres = table_of(camera_triggers=[sphere | {"at": at} for at in places])
+    entered = np.isfinite(entries(path, spheres)[0][spheres.slices[Kind.TRIGGER]])
+    gone = np.array(data.draw(st.lists(st.booleans(), min_size=len(places), max_size=len(places))))
+    events = collect(path, table_of(coins=[{"at": at} for at in places]), gone)
+    np.testing.assert_array_equal(events.coins[0], entered & ~gone)
+    assert events.points[0] == (entered & ~gone).sum()
+
+
+def test_a_game_whose_physics_diverged_meets_nothing() -> None:
+    table = table_of(coins=[{"at": COIN_AT}], camera_triggers=[SPHERE], kill_height=5.0)
+    state = GameState.initial(table)
+    state.diverged[:] = True
+    path = straight((0.0, 0.0, 9.0), COIN_AT)[None]
+    motion = sweep.Motion(path, np.zeros((1, 0)), np.zeros((1, 3)), 0.05)
+    events = sweep.find_events(state, table, motion)
+    for met in (events.coins, events.triggers, events.inside, events.finished, events.fallen):
+        assert not met.any()
+    state.diverged[:] = False
+    events = sweep.find_events(state, table, motion)
+    assert events.fallen[0]
