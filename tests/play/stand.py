@@ -252,6 +252,12 @@ def _replay() -> tuple[Plugins, Asked]:
     return (plugin, screen), asked
 
 
+_FRAMES_OF_A_RELEASE = 4
+_FRAMES_PASS = """async count => {
+    while (count--) await new Promise(requestAnimationFrame)
+}"""
+
+
 class Browser:
     """One page of the browser, with the game or the replay on it."""
 
@@ -293,10 +299,15 @@ class Browser:
         self.wait(what, lambda: differing(self.picture()[part], before) > share)
 
     def press(self, key: str, what: str, holds: Callable[[], bool]) -> None:
-        """Press a key until it has its effect: a page that draws slowly reads its keys slowly."""
+        """Press a key until it has its effect, and let it go until the page has seen that too.
+
+        A page that draws slowly reads its keys slowly: it takes a key that is let go and pressed
+        again between two of its frames for one that was held.
+        """
         self.keyboard.down(key)
         self.wait(what, holds)
         self.keyboard.up(key)
+        self.page.evaluate(_FRAMES_PASS, _FRAMES_OF_A_RELEASE)
 
     def close(self) -> None:
         """Leave the page."""
