@@ -6,7 +6,7 @@ import tempfile
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +23,10 @@ Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
+
+
+_VIEWS_KEPT: Final = 64
+"""Numbers of rows whose views of the level data are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +196,13 @@ class Simulation:
         Args:
             force_n: (N, 2) newtons of the keys on each ball, world x and y.
             hold: (N,) rows to leave alone.
+
+        Raises:
+            ValueError: ``force_n`` has another shape.
         """
+        force_n = np.ascontiguousarray(force_n, dtype=np.float64)
+        if force_n.shape != (self.num_envs, 2):
+            raise ValueError(f"force_n: found shape {force_n.shape}; must be ({self.num_envs}, 2)")
         idle = self.state.over if hold is None else self.state.over | hold
         if not idle.any():
             reward = self._step_rows(None, self.state, self.table, force_n)
@@ -224,7 +234,7 @@ class Simulation:
         motion = sweep.Motion(
             ball=path[:, :, ball : ball + 3],
             plate=path[:, -1, self.compiled.plate_qpos],
-            velocity=self._velocity[every],
+            velocity=self._velocity[every].copy(),
             duration_s=self.duration_s,
         )
         events = sweep.find_events(state, table, motion)
@@ -303,11 +313,12 @@ class Simulation:
             state = GameState(**self.state.copy_rows(rows))
             table = self._table_of(rows)
         ball = observations.BallState(
-            position=self._position[every],
-            velocity=self._velocity[every],
-            orientation=self._orientation[every],
-            spin=self._spin[every],
-            gate=self._stepper.qpos[every][:, self.compiled.gate_qpos],
+            # Copies, so that all rows and some of them are alike to the compiler.
+            position=self._position[every].copy(),
+            velocity=self._velocity[every].copy(),
+            orientation=self._orientation[every].copy(),
+            spin=self._spin[every].copy(),
+            gate=self._stepper.qpos[every][:, self.compiled.gate_qpos].copy(),
         )
         vector = observations.state_observation(ball, state, table, self._max_steps[every])
         if self.config.observation != "rays":
@@ -376,6 +387,8 @@ class Simulation:
             return self._levels.for_rows(self._level_of_row[rows])
         count = len(rows)
         if count not in self._views:
+            if len(self._views) == _VIEWS_KEPT:
+                self._views.clear()
             self._views[count] = self._levels.for_rows(self._level_of_row[rows])
         return self._views[count]
 

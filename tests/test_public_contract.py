@@ -10,7 +10,7 @@ import pytest
 
 import roller_env
 
-HEAVY = ("mujoco", "torch", "stable_baselines3", "pydantic", "matplotlib")
+HEAVY = ("mujoco", "numba", "torch", "stable_baselines3", "pydantic", "matplotlib")
 
 
 def modules_after(statement: str) -> set[str]:

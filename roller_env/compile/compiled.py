@@ -83,5 +83,7 @@ def _indices(values: object) -> Addresses:
 def level_mjcf(level: Level, physics: str | PhysicsPreset = "default") -> str:
     """Return the level as MJCF text that MuJoCo loads without this package."""
     spec = build_spec(level, physics_preset(physics))
+    # Only a batch gains by it, and older MuJoCo does not know it.
+    spec.option.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     spec.compile()
     return str(spec.to_xml())

@@ -35,7 +35,9 @@ class TriggerKind(IntEnum):
     FIRST_PERSON = 2
 
 
-_OVERHEAD, _RETREAT, _FIRST_PERSON = (int(kind) for kind in TriggerKind)
+_OVERHEAD: Final = int(TriggerKind.OVERHEAD)
+_RETREAT: Final = int(TriggerKind.RETREAT)
+_FIRST_PERSON: Final = int(TriggerKind.FIRST_PERSON)
 
 OVERHEAD_DELAY_S: Final = 100.0 / 60.0
 """`flipcam` waits 100 frames, at the nominal 60 frames a second."""
@@ -87,19 +89,18 @@ def retreat(mode: Int64, ball: Float64, camera_x: Float64, duration_s: float) ->
 
     Changes ``mode`` and ``camera_x``, both (N,), in place.
     """
+    _retreat(RETREAT_SPEED_M_S * duration_s, OFFSETS_M[MODE_BEHIND, 0], ball, mode, camera_x)
+
+
+@compiled
+def _retreat(way_m: float, behind_m: float, ball: Float64, mode: Int64, camera_x: Float64) -> None:
     for row in range(len(mode)):
-        _retreat(row, mode, ball, camera_x, duration_s)
+        if mode[row] == MODE_RETREAT:
+            camera_x[row] -= way_m
+            if camera_x[row] <= ball[row, 0] + behind_m:
+                mode[row] = MODE_BEHIND
 
 
-@compiled
-def _retreat(row: int, mode: Int64, ball: Float64, camera_x: Float64, duration_s: float) -> None:
-    if mode[row] == MODE_RETREAT:
-        camera_x[row] -= RETREAT_SPEED_M_S * duration_s
-        if camera_x[row] <= ball[row, 0] + OFFSETS_M[MODE_BEHIND, 0]:
-            mode[row] = MODE_BEHIND
-
-
-@compiled
 def move(
     duration_s: float,
     ball: Float64,
@@ -131,13 +132,44 @@ def move(
         mode: (N,) camera modes.
         camera_x: (N,) world x of cameras in mode 1, metres.
     """
+    retreat(mode, ball, camera_x, duration_s)
+    _move(
+        duration_s,
+        OFFSETS_M[:, 0],
+        ball,
+        kind,
+        fired,
+        inside,
+        entry,
+        thrust_s,
+        spent,
+        delay_s,
+        mode,
+        camera_x,
+    )
+
+
+@compiled
+def _move(
+    duration_s: float,
+    offset_x: Float64,
+    ball: Float64,
+    kind: Int64,
+    fired: Bool,
+    inside: Bool,
+    entry: Float64,
+    thrust_s: Float64,
+    spent: Bool,
+    delay_s: Float64,
+    mode: Int64,
+    camera_x: Float64,
+) -> None:
     for row in range(len(mode)):
-        _retreat(row, mode, ball, camera_x, duration_s)
         _wait_for_overhead(row, duration_s, delay_s, mode)
         setting = _fire_triggers(row, kind, fired, inside, entry, spent, delay_s)
         if setting >= 0 and kind[row, setting] == _RETREAT:
             if mode[row] != MODE_RETREAT:
-                camera_x[row] = ball[row, 0] + OFFSETS_M[mode[row], 0]
+                camera_x[row] = ball[row, 0] + offset_x[mode[row]]
             mode[row] = MODE_RETREAT
         elif setting >= 0:
             mode[row] = MODE_FIRST_PERSON

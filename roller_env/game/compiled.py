@@ -2,8 +2,9 @@
 
 In NumPy a step of a single game is a hundred calls on arrays of three numbers, which cost several
 times the physics. The rules are therefore written as what they are, loops over games and pieces,
-and compiled. Numba keeps no record of what a compiled function takes from *other* files, so a
-function here uses only functions and constants of its own module; the rest are its arguments.
+and compiled. Numba keeps no record of what a compiled function takes from *other* files, so one
+uses only functions and constants of its own module; the rest are its arguments. With
+``NUMBA_DISABLE_JIT=1`` all of it runs as plain Python, to the same bits.
 """
 
 from __future__ import annotations
@@ -18,7 +19,10 @@ _R = TypeVar("_R")
 
 
 def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Return ``function`` compiled at its first call, and kept on disk for the next process.
+    """Return ``function`` compiled at its first call.
+
+    The machine code is kept for the next process: beside the module, or in the user's cache
+    directory, or not at all where neither can be written to.
 
     Arithmetic is IEEE's, in the order written: no fused or reassociated operations, so a result
     depends neither on the number of rows nor on the processor. Indices are not checked.

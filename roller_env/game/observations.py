@@ -270,6 +270,8 @@ def _show_coins(
         if count == 0:
             continue
         out[row, _COINS_LEFT] = (count - points[row]) / count
+        if np.isnan(ball[row, 0]):
+            continue  # No coin is near to nowhere, and the search would not end.
         distance2[:] = np.inf
         nearest[:] = count
         right = np.searchsorted(coin_x[row, :count], ball[row, 0])

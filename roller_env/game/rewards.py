@@ -73,13 +73,13 @@ def _follow_route(
         # The furthest leg counts, and the legs up to the next waypoint are behind already.
         for leg in range(length[row] - 1, waypoint[row], -1):
             start, end = route[row, leg - 1], route[row, leg]
-            if _distance2(x, y, z, start, end) <= radius[row] * radius[row]:
+            if _leg_distance2(x, y, z, start, end) <= radius[row] * radius[row]:
                 waypoint[row] = leg
                 break
 
 
 @compiled
-def _distance2(x: float, y: float, z: float, start: Float64, end: Float64) -> float:
+def _leg_distance2(x: float, y: float, z: float, start: Float64, end: Float64) -> float:
     """Return the squared distance of a point to the piece from ``start`` to ``end``."""
     way_x, way_y, way_z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     x, y, z = x - start[0], y - start[1], z - start[2]

@@ -1,9 +1,9 @@
 """The rules of Roller, once, over (num_envs, ...).
 
 A control step of the game is: `controls` says what the motors do, the physics moves the ball along
-a path, `find_events` says what the ball met on it and when, `apply` draws the consequences. The
-order in which events at the same moment count is that of `roller_env.game.tables.Kind`: coins,
-plates, lift pads, camera triggers, finish; then the fall.
+a path, `roller_env.game.sweep.find_events` says what the ball met on it and when, `apply` draws the
+consequences. Events at the same moment count in this order: coins; plates, lift pads, camera
+triggers, finish, as `roller_env.game.tables.Kind` has them; the fall.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from roller_env.game.tables import Kind, LevelTable
 
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
+Int64 = npt.NDArray[np.int64]
 
 INTRO_S: Final = 6.0
 """Time from loading a level to control: one second of splash screen, five of the intro panel."""
@@ -99,8 +100,7 @@ def _lower(moves: Bool, speed: Float64, velocity: Float64) -> None:
 def apply(state: GameState, table: LevelTable, motion: Motion, events: Events) -> None:
     """Change ``state`` by a step's events and by the passing of its time."""
     state.steps += 1
-    state.coin_taken |= events.coins
-    state.points += events.points
+    _take_coins(events.points, events.coins, state.points, state.coin_taken)
     state.touching = events.inside
     _move_slabs(
         events.plates,
@@ -135,6 +135,16 @@ def apply(state: GameState, table: LevelTable, motion: Motion, events: Events) -
     )
     state.finished |= events.finished
     state.fallen |= events.fallen
+
+
+@compiled
+def _take_coins(found: Int64, collected: Bool, points: Int64, taken: Bool) -> None:
+    """Mark the coins collected, in the games that collected any: a level may have thousands."""
+    for row in range(len(found)):
+        if found[row] > 0:
+            points[row] += found[row]
+            for coin in range(taken.shape[1]):
+                taken[row, coin] |= collected[row, coin]
 
 
 @compiled

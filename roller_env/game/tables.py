@@ -38,7 +38,7 @@ class Kind(IntEnum):
     """Kinds of regions, in the order in which events at the same moment are taken.
 
     Coins come before all of them; they are found by their own table, since a level may have
-    thousands.
+    thousands. The finish is the last.
     """
 
     PLATE = 0

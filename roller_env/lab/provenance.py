@@ -12,7 +12,7 @@ from typing import Final
 
 from roller_env import __version__
 
-_PACKAGES: Final = ("mujoco", "numpy", "scipy")
+_PACKAGES: Final = ("mujoco", "numpy", "numba", "scipy")
 _CPU_INFO: Final = Path("/proc/cpuinfo")
 
 

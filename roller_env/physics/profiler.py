@@ -7,6 +7,7 @@ is set, and its Python bindings set it with the first ``MjData``; they have no w
 from __future__ import annotations
 
 import ctypes
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,14 +16,46 @@ import mujoco
 
 
 def _timer_callback() -> ctypes.c_void_p | None:
-    """Return MuJoCo's global ``mjcb_time``; None where its library is not a file of its package."""
+    """Return MuJoCo's global ``mjcb_time``; None where its library has it not or is not found.
+
+    The profiler then stays on, and all that is lost is time.
+    """
     for library in Path(mujoco.__file__).parent.glob(f"libmujoco*{mujoco.mj_versionString()}*"):
-        # Loaded already, so this is a handle of the library that the bindings use.
-        return ctypes.c_void_p.in_dll(ctypes.CDLL(str(library)), "mjcb_time")
+        try:
+            # Loaded already, so this is a handle of the library that the bindings use.
+            return ctypes.c_void_p.in_dll(ctypes.CDLL(str(library)), "mjcb_time")
+        except (OSError, ValueError):
+            continue
     return None
 
 
-_CALLBACK = _timer_callback()
+class _Switch:
+    """MuJoCo's profiler: off while anybody wants it off, then as it was before the first did."""
+
+    def __init__(self) -> None:
+        self._callback = _timer_callback()
+        self._lock = threading.Lock()
+        self._wanted_off = 0
+        self._before: int | None = None
+
+    def turn_off(self) -> None:
+        if self._callback is None:
+            return
+        with self._lock:
+            if self._wanted_off == 0:
+                self._before, self._callback.value = self._callback.value, None
+            self._wanted_off += 1
+
+    def release(self) -> None:
+        if self._callback is None:
+            return
+        with self._lock:
+            self._wanted_off -= 1
+            if self._wanted_off == 0:
+                self._callback.value = self._before
+
+
+_SWITCH = _Switch()
 
 
 @contextmanager
@@ -31,12 +64,8 @@ def profiler_off() -> Iterator[None]:
 
     The callback is the process's: other threads that step meanwhile are not timed either.
     """
-    if _CALLBACK is None:
-        yield
-        return
-    before = _CALLBACK.value
-    _CALLBACK.value = None
+    _SWITCH.turn_off()
     try:
         yield
     finally:
-        _CALLBACK.value = before
+        _SWITCH.release()

@@ -58,7 +58,8 @@ class Versions(_Frozen):
     Attributes:
         roller: this package.
         mujoco: the physics.
-        numpy: the rules' arithmetic.
+        numpy: the rules' arrays.
+        numba: the rules' arithmetic.
         python: the interpreter.
         machine: the processor's architecture, such as ``x86_64``.
         system: the operating system.
@@ -68,6 +69,7 @@ class Versions(_Frozen):
     roller: Text
     mujoco: Text
     numpy: Text
+    numba: Text
     python: Text
     machine: Text
     system: Text
@@ -80,6 +82,7 @@ class Versions(_Frozen):
             roller=__version__,
             mujoco=version("mujoco"),
             numpy=version("numpy"),
+            numba=version("numba"),
             python=platform.python_version(),
             machine=platform.machine(),
             system=platform.system(),

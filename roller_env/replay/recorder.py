@@ -141,11 +141,12 @@ def checksums(simulation: Simulation, rows: Int64) -> npt.NDArray[np.uint32]:
     """Return a CRC-32 of each row's whole state, (n,) uint32.
 
     It is of MuJoCo's integration state and of the arrays of `GameState` in their order, but for
-    the waypoint: that follows from the path, is kept with the ``shaped`` reward only, and changes
-    nothing but the reward. CRC-32 is meant for accidents, which is what is looked for here.
+    the waypoint, which follows from the path, is kept with the ``shaped`` reward only, and changes
+    nothing but the reward, and but for the points, which are the coins taken. CRC-32 is meant for
+    accidents, which is what is looked for here.
     """
     snapshot = simulation.snapshot(rows)
-    game = (values for name, values in snapshot.game.items() if name != "waypoint")
+    game = (values for name, values in snapshot.game.items() if name not in ("waypoint", "points"))
     table = np.concatenate(
         [_bytes(values, len(rows)) for values in (snapshot.physics, *game)], axis=1
     )

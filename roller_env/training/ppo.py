@@ -42,7 +42,8 @@ def learn(config: TrainingConfig, files: RunFiles) -> tuple[PPO, Progress]:
     """
     files.directory.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(config.torch_threads)
-    # In every call torch would else see whether a network's probabilities sum to 1: 2 % of it all.
+    # In every call torch would else see whether a network's probabilities sum to 1, 2 % of it all;
+    # what is not a number is refused when actions are drawn.
     torch.distributions.Distribution.set_default_validate_args(False)
     environments = make_environments(config)
     if files.checkpoint.exists():

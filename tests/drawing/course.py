@@ -48,6 +48,7 @@ def change_state(simulation: Simulation, **arrays: Any) -> None:
     snapshot = simulation.snapshot()
     for name, value in arrays.items():
         snapshot.game[name][:] = value
+    snapshot.game["points"][:] = snapshot.game["coin_taken"].sum(axis=1)
     simulation.restore(snapshot)
 
 

@@ -21,13 +21,16 @@ from roller_env.game.observations import (
     SCAN_SPACING_M,
     STATE_ENTRIES,
     STATE_SIZE,
+    BallState,
     entries,
     layout,
     ray_directions,
     rotated,
     scan_offsets,
     split,
+    state_observation,
 )
+from roller_env.game.state import GameState
 from roller_env.level import load_level, shipped_levels
 from tests.builders import BALL_RADIUS_M, Game, coin, make_level, q, resting
 
@@ -133,6 +136,23 @@ def test_whatever_coins_there_are_the_nearest_are_shown(places: list[tuple[int, 
     np.testing.assert_allclose(shown[: len(distances)], distances, rtol=1e-6)
     assert not shown[len(distances) :].any()
     assert game.observed("coins_present").sum() == len(distances)
+
+
+def test_a_ball_that_is_nowhere_sees_no_coin_and_does_not_disturb_the_others() -> None:
+    game = Game(make_level(coins=[coin(*resting(2.0)), coin(*resting(7.0))]), num_envs=2)
+    simulation = game.simulation
+    snapshot = simulation.snapshot()
+    ball = BallState(
+        position=np.array([[np.nan, 0.0, 1.0], [1.0, 0.0, 1.0]]),
+        velocity=np.zeros((2, 3)),
+        orientation=np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)),
+        spin=np.zeros((2, 3)),
+        gate=np.zeros((2, 0)),
+    )
+    state = GameState(**snapshot.game)
+    limit = np.full(2, 100)
+    shown = split(state_observation(ball, state, simulation.table, limit), STATE_ENTRIES)
+    np.testing.assert_array_equal(shown["coins_present"], [[0, 0, 0, 0], [1, 1, 0, 0]])
 
 
 def test_a_taken_coin_is_not_shown() -> None:

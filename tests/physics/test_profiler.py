@@ -41,3 +41,18 @@ def test_the_profiler_is_on_again_after_an_error() -> None:
         raise RuntimeError("in between")
     mujoco.mj_step(model, data)
     assert time_taken(data) > 0.0
+
+
+def test_two_games_that_step_at_once_leave_the_profiler_as_it_was() -> None:
+    """The second begins before the first has ended, and ends after it."""
+    model = falling_ball()
+    data = mujoco.MjData(model)
+    first, second = profiler_off(), profiler_off()
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)
+    mujoco.mj_step(model, data)
+    assert time_taken(data) == 0.0
+    second.__exit__(None, None, None)
+    mujoco.mj_step(model, data)
+    assert time_taken(data) > 0.0
