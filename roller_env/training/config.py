@@ -100,7 +100,7 @@ class TrainingConfig(_Frozen):
         checkpoint_interval_s: a checkpoint is written when the last is this old.
         normalise_observations: with running mean and variance.
         normalise_rewards: with the running variance of the discounted return.
-        torch_threads: of the updates' arithmetic; rollouts have one. Another number rounds otherwise.
+        torch_threads: of the network's arithmetic.
         evaluation_episodes: played by the trained policy for the evaluation table.
         evaluation_environment: options that are other ones then, such as ``physics: default``
             after a training with ``fast``.

@@ -41,6 +41,7 @@ def learn(config: TrainingConfig, files: RunFiles) -> tuple[PPO, Progress]:
         The learner, its environments inside, and how far it came.
     """
     files.directory.mkdir(parents=True, exist_ok=True)
+    torch.set_num_threads(config.torch_threads)
     # In every call torch would else see whether a network's probabilities sum to 1, 2 % of it all;
     # what is not a number is refused when actions are drawn.
     torch.distributions.Distribution.set_default_validate_args(False)
@@ -61,7 +62,7 @@ def learn(config: TrainingConfig, files: RunFiles) -> tuple[PPO, Progress]:
     try:
         model.learn(
             total_timesteps=config.total_steps - progress.steps,
-            callback=[UpdateThreads(config.torch_threads), recorder],
+            callback=recorder,
             reset_num_timesteps=False,
             # The recorder writes a row when its update is done, not before as SB3 would.
             log_interval=sys.maxsize,
@@ -121,27 +122,6 @@ def new_model(config: TrainingConfig, environments: PracticeStarts) -> PPO:
         seed=config.seed,
         device="cpu",
     )
-
-
-class UpdateThreads(BaseCallback):
-    """Lets the updates have several of torch's threads, and the rollouts one.
-
-    Threads of torch that have nothing to do spin for a while, on the cores that the physics needs.
-    """
-
-    def __init__(self, threads: int) -> None:
-        """Set how many ``threads`` an update has."""
-        super().__init__()
-        self._threads = threads
-
-    def _on_rollout_start(self) -> None:
-        torch.set_num_threads(1)
-
-    def _on_step(self) -> bool:
-        return True
-
-    def _on_rollout_end(self) -> None:
-        torch.set_num_threads(self._threads)
 
 
 class _BudgetSpent(Exception):

@@ -9,7 +9,6 @@ from typing import Any, Final, Self
 
 import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
@@ -18,7 +17,7 @@ from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.lab.benchmark.race import Contestant, Pace
 from roller_env.lab.benchmark.recording import SEED
 from roller_env.training.config import TrainingConfig
-from roller_env.training.ppo import UpdateThreads, make_environments, new_model
+from roller_env.training.ppo import make_environments, new_model
 
 _ROLLOUT_STEPS: Final = 64
 _EPOCHS: Final = 4
@@ -32,12 +31,9 @@ class Training(Contestant):
     Schedules end with every round; that changes what is learnt, and not what it costs.
     """
 
-    def __init__(
-        self, name: str, model: PPO, simulated_s: float, callback: BaseCallback | None = None
-    ) -> None:
-        """Race a learner, its environments inside, with what its training calls back."""
+    def __init__(self, name: str, model: PPO, simulated_s: float) -> None:
+        """Race a learner, its environments inside."""
         self._model = model
-        self._callback = callback
         super().__init__(name, model.n_envs * model.n_steps, simulated_s)
 
     def __enter__(self) -> Self:
@@ -61,9 +57,7 @@ class Training(Contestant):
 
     def _run(self, steps: int) -> float:
         start = time.perf_counter()
-        self._model.learn(
-            steps * self.env_steps, callback=self._callback, reset_num_timesteps=False
-        )
+        self._model.learn(steps * self.env_steps, reset_num_timesteps=False)
         return time.perf_counter() - start
 
 
@@ -92,8 +86,8 @@ def as_make_train_does(name: str, config: TrainingConfig) -> Training:
     """Return the learner and environments of a training configuration, without its records."""
     environments = make_environments(config)
     duration_s = make_config(**config.environment_options).control_dt_s
-    threads = UpdateThreads(config.torch_threads)
-    return Training(name, new_model(config, environments), duration_s, threads)
+    torch.set_num_threads(config.torch_threads)
+    return Training(name, new_model(config, environments), duration_s)
 
 
 def _ppo(environments: VecEnv) -> PPO:
