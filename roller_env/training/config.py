@@ -85,34 +85,30 @@ class CloningConfig(_Frozen):
 class TrainingConfig(_Frozen):
     """A training, whole: with the package's version it is all that a result depends on.
 
-        Attributes:
-            level: name or path of a level, as ``Roller/Level-v0`` takes it.
-            environment: options of the environment (``reward``, ``observation``, ...), those of
-                `roller_env.config.EnvConfig`; ``reward_weights`` by name.
-            algorithm: how it learns.
-            seed: of the environments, the network's initial weights and the order of the samples.
-            num_envs: environments that are stepped together.
-            practice_share: of the episodes that begin at a waypoint of the route that the agent has
-                reached before, not at the level's start; see `roller_env.training.practice`.
-            total_steps: environment steps, over all environments, after which training ends.
-            wall_clock_budget_s: training ends after this time at the latest; None for no limit.
-                A run that ends by time is not repeatable bit for bit on another machine.
-            checkpoint_interval_s: a checkpoint is written when the last is this old.
-            normalise_observations: with running mean and variance.
-            normalise_rewards: with the running variance of the discounted return.
-    <<<<<<< Updated upstream
-            torch_threads: of the network's arithmetic.
-    =======
-            torch_threads: of the network's arithmetic.
-    >>>>>>> Stashed changes
-            evaluation_episodes: played by the trained policy for the evaluation table.
-            evaluation_environment: options that are other ones then, such as ``physics: default``
-                after a training with ``fast``.
-            evaluation_replays: whether every episode of the evaluation is kept as a replay.
-            demonstrations: replays or a Minari data set that the policy learns from before its first
-                step, as `roller_env.training.demonstrations.load_demonstrations` takes them.
-            cloning: how it learns from them.
-            ppo: what the algorithm is told.
+    Attributes:
+        level: name or path of a level, as ``Roller/Level-v0`` takes it.
+        environment: options of the environment (``reward``, ``observation``, ...), those of
+            `roller_env.config.EnvConfig`; ``reward_weights`` by name.
+        algorithm: how it learns.
+        seed: of the environments, the network's initial weights and the order of the samples.
+        num_envs: environments that are stepped together.
+        practice_share: of the episodes that begin at a waypoint of the route that the agent has
+            reached before, not at the level's start; see `roller_env.training.practice`.
+        total_steps: environment steps, over all environments, after which training ends.
+        wall_clock_budget_s: training ends after this time at the latest; None for no limit.
+            A run that ends by time is not repeatable bit for bit on another machine.
+        checkpoint_interval_s: a checkpoint is written when the last is this old.
+        normalise_observations: with running mean and variance.
+        normalise_rewards: with the running variance of the discounted return.
+        torch_threads: of the network's arithmetic.
+        evaluation_episodes: played by the trained policy for the evaluation table.
+        evaluation_environment: options that are other ones then, such as ``physics: default``
+            after a training with ``fast``.
+        evaluation_replays: whether every episode of the evaluation is kept as a replay.
+        demonstrations: replays or a Minari data set that the policy learns from before its first
+            step, as `roller_env.training.demonstrations.load_demonstrations` takes them.
+        cloning: how it learns from them.
+        ppo: what the algorithm is told.
     """
 
     level: str
