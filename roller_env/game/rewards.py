@@ -16,6 +16,7 @@ from roller_env.game.sweep import Events
 from roller_env.game.tables import LevelTable
 
 Float64 = npt.NDArray[np.float64]
+Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
 RewardMode = Literal["points", "shaped"]
 
@@ -47,12 +48,31 @@ class RewardWeights:
 
 def points_reward(events: Events, weights: RewardWeights) -> Float64:
     """Return the points, (N,), of a step's events: coins, finish, fall."""
-    points: Float64 = (
-        weights.coin * events.points
-        + weights.finish * events.finished
-        + weights.fall * events.fallen
+    points = np.empty(len(events.points))
+    _add_up(
+        float(weights.coin),
+        float(weights.finish),
+        float(weights.fall),
+        events.points,
+        events.finished,
+        events.fallen,
+        points,
     )
     return points
+
+
+@compiled
+def _add_up(
+    coin: float,
+    finish: float,
+    fall: float,
+    coins: Int64,
+    finished: Bool,
+    fallen: Bool,
+    points: Float64,
+) -> None:
+    for row in range(len(points)):
+        points[row] = coin * coins[row] + finish * finished[row] + fall * fallen[row]
 
 
 def follow_route(state: GameState, table: LevelTable, ball: Float64) -> None:
@@ -120,13 +140,21 @@ def _route_progress(
             progress[row] = min(max(behind / total, 0.0), 1.0)
 
 
-def shaping(
-    before: Float64, after: Float64, terminated: npt.NDArray[np.bool_], discount: float
-) -> Float64:
+def shaping(before: Float64, after: Float64, terminated: Bool, discount: float) -> Float64:
     """Return gamma * Phi(s') - Phi(s), (N,), with Phi = 0 in terminal states.
 
     Over any episode this telescopes to a sum that depends on the start alone, so it never changes
     which policy is best (Ng, Harada & Russell 1999), and staying in place earns
     (gamma - 1) * Phi <= 0.
     """
-    return discount * np.where(terminated, 0.0, after) - before
+    reward = np.empty(len(before))
+    _shape(before, after, terminated, float(discount), reward)
+    return reward
+
+
+@compiled
+def _shape(
+    before: Float64, after: Float64, terminated: Bool, discount: float, reward: Float64
+) -> None:
+    for row in range(len(reward)):
+        reward[row] = discount * (0.0 if terminated[row] else after[row]) - before[row]

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import mujoco
@@ -38,7 +37,7 @@ class _Switch:
         self._wanted_off = 0
         self._before: int | None = None
 
-    def turn_off(self) -> None:
+    def __enter__(self) -> None:
         if self._callback is None:
             return
         with self._lock:
@@ -46,7 +45,7 @@ class _Switch:
                 self._before, self._callback.value = self._callback.value, None
             self._wanted_off += 1
 
-    def release(self) -> None:
+    def __exit__(self, *_error: object) -> None:
         if self._callback is None:
             return
         with self._lock:
@@ -58,14 +57,9 @@ class _Switch:
 _SWITCH = _Switch()
 
 
-@contextmanager
-def profiler_off() -> Iterator[None]:
+def profiler_off() -> AbstractContextManager[None]:
     """Let MuJoCo step without its profiler; afterwards it is as it was.
 
     The callback is the process's: other threads that step meanwhile are not timed either.
     """
-    _SWITCH.turn_off()
-    try:
-        yield
-    finally:
-        _SWITCH.release()
+    return _SWITCH
