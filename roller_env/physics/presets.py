@@ -40,7 +40,7 @@ FAST: Final = PhysicsPreset("fast", dt_s=1 / 120, solver="PGS", iterations=500)
 Errors: 0.16 % of the way after 5 s of driving, headings exact, 0.29 % on the classic course, depth
 of the 46.9 m fall 0.43 of what falls through (passes a deck of 16 quants from 70 m/s on),
 elasticity 0.016, friction 0.001; 49 seams in a row that cannot be merged throw the ball over a
-quant high at 39 % of all speeds (``default``: 5 %). Cost: 0.55 CPU ms for a simulated second of the
+quant high at 39 % of all speeds (``default``: 5 %). Cost: 0.54 CPU ms for a simulated second of the
 classic level."""
 
 DEFAULT: Final = PhysicsPreset("default", dt_s=1 / 240)
@@ -56,7 +56,7 @@ ACCURATE: Final = PhysicsPreset(
 """For references: smooth motion to 1e-6, and the least hop of a skidding ball (4 mm, not 35).
 
 Errors: 0.00006 % after 5 s of driving, headings exact, 0.05 % on the classic course, depth of the
-fall 0.07 of what falls through, elasticity 0.019, friction 0.0001. Cost: 16 CPU ms for a simulated
+fall 0.07 of what falls through, elasticity 0.019, friction 0.0001. Cost: 15 CPU ms for a simulated
 second."""
 
 PRESETS: Final[dict[str, PhysicsPreset]] = {
