@@ -162,11 +162,13 @@ def test_the_parts_are_the_whole() -> None:
 
 def test_physics_that_is_made_finer_takes_a_greater_share() -> None:
     def share(control_dt_s: float) -> float:
-        vector = VectorStep("vector", 64, 1, level="flat", control_dt_s=control_dt_s)
-        rows = where_the_time_goes("step", lambda: vector.run(round(6 / control_dt_s)), 1)
+        # Few environments, so that Python's part, which is as long for many, is seen.
+        vector = VectorStep("vector", 4, 1, level="flat", control_dt_s=control_dt_s)
+        vector.run(10)
+        rows = where_the_time_goes("step", lambda: vector.run(round(20 / control_dt_s)), 1)
         return sum(row.share for row in rows if row.part == "physics: MuJoCo")
 
-    assert share(1 / 240) < 0.7 < share(0.2)
+    assert share(1 / 240) < 0.6 < share(0.2)
 
 
 def test_time_outside_the_house_is_all_else() -> None:
