@@ -122,7 +122,7 @@ def _draw_memory(panel: Axes, rows: Sequence[MemoryRow]) -> None:
     panel.plot([MEMORY_ENVS], [bound], marker="v", color=_QUIET)
     panel.text(
         0.97,
-        0.8,
+        0.2,
         f"▼ goal: at most {bound:,.0f} MB\nwith {MEMORY_ENVS:,} environments",
         transform=panel.transAxes,
         color=_QUIET,
