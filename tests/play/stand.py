@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import multiprocessing
+import os
 import socket
 import threading
 import time
@@ -17,6 +18,7 @@ from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 from PIL import Image
 
 from roller_env.play.app import Choices, GamePlugin, ScreenPlugin
@@ -339,3 +341,11 @@ def gold_pixels(part: Picture) -> npt.NDArray[np.bool_]:
 def gold(part: Picture) -> int:
     """Return how many pixels are of that gold."""
     return int(gold_pixels(part).sum())
+
+
+needs_a_steady_browser = pytest.mark.skipif(
+    "ROLLER_STEADY_BROWSER" not in os.environ,
+    reason="in vain in one run of three where software draws two pages at once: set "
+    "ROLLER_STEADY_BROWSER=1 and run tests/play on one worker",
+)
+"""For tests that wait for a picture to follow the mouse or a key in a replay or a recorded game."""

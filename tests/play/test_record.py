@@ -19,7 +19,13 @@ from roller_env.replay import load_replay, verify
 from roller_env.training.behaviour_cloning import start_from_demonstrations
 from roller_env.training.demonstrations import load_demonstrations
 from roller_env.training.files import RunFiles
-from tests.play.stand import Browser, free_port, is_served, wait_for
+from tests.play.stand import (
+    Browser,
+    free_port,
+    is_served,
+    needs_a_steady_browser,
+    wait_for,
+)
 from tests.training.small import small_config
 
 ROOT = Path(__file__).parents[2]
@@ -51,6 +57,7 @@ class Game:
         return self._process.returncode, output
 
 
+@needs_a_steady_browser
 def test_what_is_played_with_the_keys_is_recorded_and_can_be_learnt_from(
     chromium: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,7 +18,10 @@ from tests.play.stand import (
     ReplayStand,
     dark,
     gold_pixels,
+    needs_a_steady_browser,
 )
+
+pytestmark = needs_a_steady_browser
 
 
 @pytest.fixture(scope="module")
