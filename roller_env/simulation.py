@@ -11,8 +11,9 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from roller_env import checks
 from roller_env.compile.compiled import CompiledLevel, compile_level
-from roller_env.config import MAX_ENVS, EnvConfig, check_whole
+from roller_env.config import MAX_ENVS, EnvConfig
 from roller_env.game import observations, rewards, rules, sweep
 from roller_env.game.state import GameState, score_percent
 from roller_env.game.tables import LevelTable
@@ -90,9 +91,8 @@ class Simulation:
             LevelError: the level is not valid.
             ValueError: ``num_envs`` is not a whole number from 1 to `MAX_ENVS`.
         """
-        check_whole("num_envs", num_envs, 1, MAX_ENVS)
         self.config = config
-        self.num_envs = num_envs
+        self.num_envs = checks.whole("num_envs", num_envs, 1, MAX_ENVS)
         self.compiled: CompiledLevel = compile_level(load_level(config.level), config.physics)
         self.divergences = 0
         self._duration_s = config.substeps * self.compiled.preset.dt_s
