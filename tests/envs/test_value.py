@@ -1,4 +1,4 @@
-"""An environment is a value: it is copied, pickled, put back to a state, begins where it is told."""
+"""An environment is a value: copied, pickled, put back to a state, begun where it is told."""
 
 from __future__ import annotations
 
@@ -404,7 +404,8 @@ def test_a_ball_does_not_begin_inside_the_finish() -> None:
 def test_a_state_has_all_of_it() -> None:
     env = RollerEnv(level="flat")
     env.reset(seed=0)
-    for other in ({"position": (0, 0, 1)}, {"intro": True}, {"coins": []}):
+    others: list[dict[str, Any]] = [{"position": (0, 0, 1)}, {"intro": True}, {"coins": []}]
+    for other in others:
         with pytest.raises(ValueError, match=r"options\['state'\]: found with '\w+'; a state has"):
             env.reset(options={"state": env.get_state(), **other})
 
@@ -421,8 +422,7 @@ def test_a_level_without_coins_can_be_told_that_none_are_left() -> None:
 
 def test_a_copy_keeps_a_preset_of_ones_own() -> None:
     preset = PhysicsPreset("mine", dt_s=0.01, integrator="Euler")
-    other: Simulation = pickle.loads(
-        pickle.dumps(Simulation(RollerEnv(level="flat", physics=preset).config))
-    )
+    env = RollerEnv(level="flat", physics=preset)
+    other: Simulation = pickle.loads(pickle.dumps(env.simulation))
     assert other.compiled.preset == preset
     assert other.compiled.model.opt.timestep == 0.01
