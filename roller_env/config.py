@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field, fields
-from difflib import get_close_matches
-from numbers import Integral, Real
+import sys
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Final, Literal, get_args
 
+from pydantic import JsonValue
+
+from roller_env import checks
 from roller_env.game.actions import ActionMode
 from roller_env.game.cameras import MODES
 from roller_env.game.observations import ObservationMode
 from roller_env.game.rewards import RewardMode, RewardWeights
-from roller_env.level import Level
+from roller_env.level import Level, load_level
+from roller_env.level.load import is_path
 from roller_env.physics.presets import PRESETS, PhysicsPreset, physics_preset
 
 RenderMode = Literal["rgb_array"]
@@ -25,6 +29,10 @@ MAX_ENVS: Final = 10**6
 @dataclass(frozen=True, kw_only=True)
 class EnvConfig:
     """Options of `gymnasium.make("Roller/...", **options)` and of `RollerVecEnv`.
+
+    Every option is given as Python's objects or as plain JSON values: a level, a preset and the
+    weights also as mappings of their fields; NumPy's numbers are numbers. The attributes are then
+    what they are written as here, and `to_json` and `make_config` go there and back.
 
     Attributes:
         level: name of a shipped level, path of a level file, or a `Level`.
@@ -64,85 +72,102 @@ class EnvConfig:
 
     def __post_init__(self) -> None:
         """Check every option, and the control step against the physics step."""
-        if not isinstance(self.level, (str, os.PathLike, Level)):
-            raise ValueError(
-                f"level: found {self.level!r}; must be a shipped level's name, a path or a Level"
-            )
-        _one_of("action", self.action, get_args(ActionMode))
-        _one_of("observation", self.observation, get_args(ObservationMode))
-        _one_of("reward", self.reward, get_args(RewardMode))
-        _one_of("render_mode", self.render_mode, (None, *get_args(RenderMode)))
-        _one_of("camera", self.camera, ("game", *range(len(MODES))))
-        if not isinstance(self.reward_weights, RewardWeights):
-            raise ValueError(
-                f"reward_weights: found {self.reward_weights!r}; must be a RewardWeights"
-            )
-        if not (_is_number(self.discount) and 0.0 <= self.discount <= 1.0):
-            raise ValueError(f"discount: found {self.discount!r}; must be a number from 0 to 1")
-        for name in ("width", "height"):
-            check_whole(name, getattr(self, name), 16, MAX_PICTURE_EDGE)
-        check_whole("num_threads", self.num_threads, 0, 4096)
+        checked = {
+            "level": _level(self.level),
+            "action": checks.one_of("action", self.action, get_args(ActionMode)),
+            "observation": checks.one_of(
+                "observation", self.observation, get_args(ObservationMode)
+            ),
+            "reward": checks.one_of("reward", self.reward, get_args(RewardMode)),
+            "reward_weights": checks.record("reward_weights", RewardWeights, self.reward_weights),
+            "discount": checks.number("discount", self.discount, 0.0, 1.0, "a number from 0 to 1"),
+            "physics": _physics(self.physics),
+            "camera": checks.one_of("camera", self.camera, ("game", *range(len(MODES)))),
+            "render_mode": checks.one_of(
+                "render_mode", self.render_mode, (None, *get_args(RenderMode))
+            ),
+            "width": checks.whole("width", self.width, 16, MAX_PICTURE_EDGE),
+            "height": checks.whole("height", self.height, 16, MAX_PICTURE_EDGE),
+            "num_threads": checks.whole("num_threads", self.num_threads, 0, 4096),
+        }
         if self.max_episode_steps is not None:
-            check_whole("max_episode_steps", self.max_episode_steps, 1, 10**9)
-        self._check_control_dt()
-
-    def _check_control_dt(self) -> None:
-        if not isinstance(self.physics, PhysicsPreset):
-            _one_of("physics", self.physics, tuple(PRESETS))
-        step = physics_preset(self.physics).dt_s
-        if not (_is_number(self.control_dt_s) and 0.0 < self.control_dt_s <= 1.0):
-            raise ValueError(
-                f"control_dt_s: found {self.control_dt_s!r}; must be a number of seconds more than "
-                "0 and at most 1"
+            checked["max_episode_steps"] = checks.whole(
+                "max_episode_steps", self.max_episode_steps, 1, 10**9
             )
-        multiple = self.control_dt_s / step
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "control_dt_s", self._checked_control_dt())
+
+    def _checked_control_dt(self) -> float:
+        step = physics_preset(self.physics).dt_s
+        seconds = "a number of seconds more than 0 and at most 1"
+        control_dt_s = checks.number(
+            "control_dt_s", self.control_dt_s, sys.float_info.min, 1.0, seconds
+        )
+        multiple = control_dt_s / step
         if round(multiple) < 1 or abs(multiple - round(multiple)) > 1e-6:
             nearest = max(round(multiple), 1) * step
             raise ValueError(
-                f"control_dt_s: found {self.control_dt_s:g}, which is no multiple of the physics "
+                f"control_dt_s: found {control_dt_s:g}, which is no multiple of the physics "
                 f"step {step:g}; the nearest is {nearest:.10g}"
             )
+        return control_dt_s
 
     @property
     def substeps(self) -> int:
         """Physics steps in a control step."""
         return round(self.control_dt_s / physics_preset(self.physics).dt_s)
 
+    def to_json(self) -> dict[str, JsonValue]:
+        """Return every option as a plain JSON value.
+
+        ``make_config(**config.to_json())`` is an equal configuration.
+        """
+        options: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
+        options["reward_weights"] = asdict(self.reward_weights)
+        if isinstance(self.level, Level):
+            options["level"] = self.level.model_dump(mode="json", exclude_defaults=True)
+        if isinstance(self.physics, PhysicsPreset):
+            options["physics"] = asdict(self.physics)
+        return options
+
 
 def make_config(**options: Any) -> EnvConfig:
     """Return the configuration with these options.
 
     Raises:
-        ValueError: there is no option of that name, or its value is not allowed.
+        TypeError: there is no option of that name.
+        ValueError: an option's value is not allowed.
     """
     known = [f.name for f in fields(EnvConfig)]
     for name in options:
         if name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise ValueError(f"unknown option {name!r}; options are {', '.join(known)}{hint}")
+            # Python's own words: some clients offer a keyword and look for them in the answer.
+            raise TypeError(
+                f"{EnvConfig.__name__}() got an unexpected keyword argument {name!r}; options are "
+                f"{', '.join(known)}{checks.nearest(name, known)}"
+            )
     return EnvConfig(**options)
 
 
-def _one_of(name: str, value: object, allowed: tuple[object, ...]) -> None:
-    # True == 1 in Python, but camera=True is a mistake.
-    if any(value == choice and type(value) is type(choice) for choice in allowed):
-        return
-    near = get_close_matches(str(value), [str(choice) for choice in allowed], n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
-    choices = ", ".join(repr(choice) for choice in allowed)
-    raise ValueError(f"{name}: found {value!r}; allowed are {choices}{hint}")
+def _level(level: object) -> str | Level:
+    """Return a level, or its name or path as text that JSON can carry."""
+    if isinstance(level, Mapping):
+        return load_level(level)
+    if isinstance(level, Level):
+        return level
+    if isinstance(level, str):
+        return str(level)
+    if isinstance(level, os.PathLike):
+        path = os.fsdecode(level)
+        return path if is_path(path) else f"{os.curdir}{os.sep}{path}"
+    raise ValueError(
+        f"level: found {level!r}; must be a shipped level's name, a path, a Level or a mapping of "
+        "a level's fields"
+    )
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
-
-
-def check_whole(name: str, value: object, low: int, high: int) -> None:
-    """Refuse what is not a whole number from ``low`` to ``high``.
-
-    Raises:
-        ValueError: it is not; the message calls it ``name``.
-    """
-    if isinstance(value, bool) or not isinstance(value, Integral) or not low <= int(value) <= high:
-        raise ValueError(f"{name}: found {value!r}; must be a whole number from {low} to {high}")
+def _physics(physics: object) -> str | PhysicsPreset:
+    if isinstance(physics, PhysicsPreset | Mapping):
+        return checks.record("physics", PhysicsPreset, physics)
+    return checks.one_of("physics", physics, tuple(PRESETS))

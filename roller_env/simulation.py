@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import tempfile
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from roller_env import checks
 from roller_env.compile.compiled import CompiledLevel, compile_level
-from roller_env.config import MAX_ENVS, EnvConfig, check_whole
+from roller_env.config import MAX_ENVS, EnvConfig
 from roller_env.game import observations, rewards, rules, sweep
 from roller_env.game.state import GameState, score_percent
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level, load_level
+from roller_env.level.check import obstacles, obstructions
+from roller_env.level.expand import Solid
+from roller_env.level.schema import MAX_COORDINATE_M
+from roller_env.physics.presets import PhysicsPreset
 from roller_env.physics.stepper import Stepper
 
 Float32 = npt.NDArray[np.float32]
@@ -33,12 +39,17 @@ _VIEWS_KEPT: Final = 64
 class Snapshot:
     """Everything that a row's future depends on, for n rows.
 
+    A value: it can be pickled, and nothing in it changes by playing on. A simulation of another
+    level, physics preset or control step refuses it.
+
     Attributes:
-        level: what is played; another level's simulation refuses the snapshot.
+        level: what is played.
         physics: (n, nstate) float64, MuJoCo's integration state.
         game: the arrays of `GameState`.
         level_of_row: (n,) which level each row plays.
         generators: the random generators' states.
+        preset: the physics settings.
+        control_dt_s: length of a control step, seconds.
     """
 
     level: Level
@@ -46,6 +57,49 @@ class Snapshot:
     game: dict[str, npt.NDArray[Any]]
     level_of_row: Int64
     generators: tuple[dict[str, Any], ...]
+    preset: PhysicsPreset
+    control_dt_s: float
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.physics)
+
+    def take(self, rows: npt.ArrayLike) -> Snapshot:
+        """Return the snapshot of some of the rows, each as often as it is named.
+
+        Args:
+            rows: (m,) row numbers, or a mask of (n,).
+        """
+        numbers = np.arange(len(self))[np.asarray(rows)]
+        return replace(
+            self,
+            physics=self.physics[numbers],
+            game={name: values[numbers] for name, values in self.game.items()},
+            level_of_row=self.level_of_row[numbers],
+            generators=tuple(self.generators[row] for row in numbers),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Where n balls begin an episode, and with what; see `Simulation.placement`, which checks it.
+
+    Attributes:
+        position: (n, 3) ball centres, metres, world frame; None: at the level's start.
+        velocity: (n, 3) m/s, world frame; None: at rest.
+        angular_velocity: (n, 3) rad/s, world frame; None: without spin.
+        coin_left: (n, K) which coins are still there; None: all.
+    """
+
+    position: Float64 | None = None
+    velocity: Float64 | None = None
+    angular_velocity: Float64 | None = None
+    coin_left: Bool | None = None
+
+    def take(self, rows: Int64) -> Placement:
+        """Return the placement of some of the rows."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return Placement(**{k: v if v is None else v[rows] for k, v in values.items()})
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +144,16 @@ class Simulation:
             LevelError: the level is not valid.
             ValueError: ``num_envs`` is not a whole number from 1 to `MAX_ENVS`.
         """
-        check_whole("num_envs", num_envs, 1, MAX_ENVS)
         self.config = config
-        self.num_envs = num_envs
+        self.num_envs = checks.whole("num_envs", num_envs, 1, MAX_ENVS)
         self.compiled: CompiledLevel = compile_level(load_level(config.level), config.physics)
         self.divergences = 0
+        self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
+        self._make_games()
+
+    def _make_games(self) -> None:
+        """Make the games of which no episode has begun, from what cannot be computed anew."""
+        config, num_envs = self.config, self.num_envs
         self._duration_s = config.substeps * self.compiled.preset.dt_s
         self._levels = LevelTable.of([self.compiled.level])
         self._level_of_row = np.zeros(num_envs, dtype=np.int64)
@@ -104,7 +163,6 @@ class Simulation:
         # No episode has begun, so that there is nothing to step before the first reset.
         self.state.truncated[:] = True
         self._stepper = Stepper(self.compiled.model, num_envs, config.substeps, config.num_threads)
-        self._generators = [np.random.default_rng() for _ in range(num_envs)]
         self._potential = np.zeros(num_envs)
         self._max_steps = self._episode_lengths()
         self._ray_directions = observations.ray_directions()
@@ -114,6 +172,28 @@ class Simulation:
         self._orientation = self._stepper.qpos[:, ball + 3 : ball + 7]
         self._velocity = self._stepper.qvel[:, velocity : velocity + 3]
         self._spin = self._stepper.qvel[:, velocity + 3 : velocity + 6]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy is made of; it goes on with the same bits, and on its own.
+
+        The generators themselves are among it, so that whoever shares them with this simulation
+        shares, when both are copied, the copies.
+        """
+        return {
+            "config": self.config,
+            "num_envs": self.num_envs,
+            "compiled": self.compiled,
+            "divergences": self.divergences,
+            "_generators": self._generators,
+            "snapshot": self.snapshot(),
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Become the copy."""
+        snapshot = state["snapshot"]
+        self.__dict__.update({k: v for k, v in state.items() if k != "snapshot"})
+        self._make_games()
+        self.restore(snapshot)
 
     # What can be read ------------------------------------------------------------------------
 
@@ -137,20 +217,26 @@ class Simulation:
         """(N,) time since each episode began."""
         return self.state.steps.astype(np.float64) * self.duration_s
 
-    def results(self, rows: Int64) -> dict[str, npt.NDArray[Any]]:
-        """Return how the games in ``rows`` stand, arrays of (n,) by name.
+    @property
+    def generators(self) -> tuple[np.random.Generator, ...]:
+        """The random generator of each row."""
+        return tuple(self._generators)
+
+    def results(self, rows: Int64 | None = None) -> dict[str, npt.NDArray[Any]]:
+        """Return how the games in ``rows`` (all, if None) stand, arrays of (n,) by name.
 
         ``success`` (the finish was reached), ``score_percent`` (coins of the level's, 0 to 100),
         ``coins`` (collected), ``time_s``, ``fall`` and ``diverged``.
         """
-        coins = self.state.points[rows]
+        every: Int64 | slice = slice(None) if rows is None else rows
+        coins = self.state.points[every]
         return {
-            "success": self.state.finished[rows],
-            "score_percent": score_percent(coins, self.table.coin_count[rows]),
-            "coins": coins,
-            "time_s": self.time_s[rows],
-            "fall": self.state.fallen[rows],
-            "diverged": self.state.diverged[rows],
+            "success": self.state.finished[every].copy(),
+            "score_percent": score_percent(coins, self.table.coin_count[every]),
+            "coins": coins.copy(),
+            "time_s": self.time_s[every],
+            "fall": self.state.fallen[every].copy(),
+            "diverged": self.state.diverged[every].copy(),
         }
 
     # What changes it -------------------------------------------------------------------------
@@ -163,21 +249,30 @@ class Simulation:
             )
         self._generators = generators
 
-    def reset(self, rows: Int64 | None = None, intro: bool = False) -> None:
+    def reset(
+        self,
+        rows: Int64 | None = None,
+        intro: bool = False,
+        placement: Placement | None = None,
+    ) -> None:
         """Load the level anew in ``rows`` (all, if None).
 
         Args:
             rows: (n,) row indices.
             intro: whether the keys work only after the intro's `rules.INTRO_S`, as when the game
                 is started; after a fall it goes on at once.
+            placement: of the n balls, from `placement`; the rows' generators draw the same numbers
+                with one as without.
 
         Raises:
             ValueError: ``rows`` are not different row numbers.
         """
-        # In order, as the physics asks for them; every row has its own generator.
-        rows = np.arange(self.num_envs) if rows is None else np.sort(self._checked(rows))
+        rows = np.arange(self.num_envs) if rows is None else self._checked(rows)
         if len(rows) == 0:
             return
+        # In order, as the physics asks for them; every row has its own generator.
+        order = np.argsort(rows)
+        rows = rows[order]
         table = self._table_of(rows)
         self._stepper.reset(rows)
         jitter = np.array([self._generators[row].uniform(-1.0, 1.0, 2) for row in rows])
@@ -188,7 +283,69 @@ class Simulation:
         if intro:
             fresh.control_delay_s[:] = rules.INTRO_S
         self.state.set_rows(rows, fresh.copy_rows())
+        if placement is not None:
+            self._place(rows, placement.take(order))
         self._measure_potential(rows)
+
+    def placement(
+        self,
+        position: Float64 | None = None,
+        velocity: Float64 | None = None,
+        angular_velocity: Float64 | None = None,
+        coin_left: Bool | None = None,
+    ) -> Placement:
+        """Return a checked `Placement` of n balls for `reset`; see there for the arguments.
+
+        Raises:
+            ValueError: a number is not finite or out of this world, or a ball would begin inside a
+                solid or the finish, or where it has fallen already.
+        """
+        vectors = {
+            "position": (position, "m"),
+            "velocity": (velocity, "m/s"),
+            "angular_velocity": (angular_velocity, "rad/s"),
+        }
+        for name, (values, unit) in vectors.items():
+            if values is not None and not (np.abs(values) <= MAX_COORDINATE_M).all():
+                raise ValueError(
+                    f"{name}: found {values.tolist()}; must be {-MAX_COORDINATE_M:g} to "
+                    f"{MAX_COORDINATE_M:g} {unit}"
+                )
+        if position is not None:
+            self._check_positions(position)
+        return Placement(position, velocity, angular_velocity, coin_left)
+
+    def _check_positions(self, position: Float64) -> None:
+        level = self.compiled.level
+        for ball in position[position[:, 2] <= level.kill_height]:
+            raise ValueError(
+                f"position: found {ball.tolist()}; must be above the level's kill height, "
+                f"{level.kill_height:g} m"
+            )
+        for row, what in obstructions(level, self._obstacles, position).items():
+            raise ValueError(
+                f"position: found {position[row].tolist()}, where a ball of radius "
+                f"{level.ball.radius:g} m is inside {what}; must be free space"
+            )
+
+    @cached_property
+    def _obstacles(self) -> tuple[Solid, ...]:
+        return obstacles(self.compiled.level)
+
+    def _place(self, rows: Int64, placement: Placement) -> None:
+        """Put the balls of rows that were just reset where a placement says."""
+        if placement.position is not None:
+            self._position[rows] = placement.position
+        if placement.velocity is not None:
+            self._velocity[rows] = placement.velocity
+        if placement.angular_velocity is not None:
+            # The ball's own frame, in which MuJoCo has it, is still the world's.
+            self._spin[rows] = placement.angular_velocity
+        if placement.coin_left is not None:
+            self.state.coin_taken[rows] = ~placement.coin_left
+            self.state.points[rows] = (~placement.coin_left).sum(axis=1)
+        if placement.position is not None:
+            self._follow_route(rows)
 
     def step(self, force_n: Float64, hold: Bool | None = None) -> Transition:
         """Advance every game that is not over by one control step.
@@ -264,6 +421,13 @@ class Simulation:
         )
         self._potential[rows] = potential
         return shaping
+
+    def _follow_route(self, rows: Int64) -> None:
+        """Count the route up to where the balls of ``rows`` are as passed."""
+        if self.config.reward == "shaped" and len(rows):
+            part = GameState(**self.state.copy_rows(rows))
+            rewards.follow_route(part, self._table_of(rows), self._position[rows])
+            self.state.waypoint[rows] = part.waypoint
 
     def _measure_potential(self, rows: Int64) -> None:
         """Set the potential of rows whose state was replaced."""
@@ -350,6 +514,8 @@ class Simulation:
             game=self.state.copy_rows(rows),
             level_of_row=self._level_of_row[rows].copy(),
             generators=tuple(self._generators[row].bit_generator.state for row in rows),
+            preset=self.compiled.preset,
+            control_dt_s=self.config.control_dt_s,
         )
 
     def restore(self, snapshot: Snapshot, rows: Int64 | None = None) -> None:
@@ -358,24 +524,56 @@ class Simulation:
         The same actions then give the same bits as they did after the snapshot.
 
         Raises:
-            ValueError: the snapshot is of another level, or does not fit the rows.
+            ValueError: the snapshot is of another game, or does not fit the rows.
         """
-        count = len(snapshot.physics)
+        count = len(snapshot)
         rows = self._checked(np.arange(count) if rows is None else rows)
         if len(rows) != count:
             raise ValueError(f"rows: found {len(rows)} for a snapshot of {count}")
-        if snapshot.level != self.compiled.level:
-            raise ValueError(
-                f"snapshot: found one of level {snapshot.level.name!r}; this simulation plays "
-                f"{self.compiled.level.name!r}"
-            )
+        self.check_snapshot(snapshot)
         self._stepper.reset(np.sort(rows))
         self._stepper.state[rows] = snapshot.physics
         self.state.set_rows(rows, snapshot.game)
         self._level_of_row[rows] = snapshot.level_of_row
         for row, generator in zip(rows, snapshot.generators, strict=True):
             self._generators[row].bit_generator.state = generator
+        # The way is only kept where it is rewarded; elsewhere it is found again, from the first
+        # step on, after which the ball has passed what it has reached.
+        self._follow_route(rows[snapshot.game["steps"] > 0])
         self._measure_potential(rows)
+
+    def check_snapshot(self, snapshot: Snapshot) -> None:
+        """Refuse what is no snapshot of the game that is played here.
+
+        Raises:
+            TypeError: it is no snapshot.
+            ValueError: it is of another level, physics preset or control step.
+        """
+        if not isinstance(snapshot, Snapshot):
+            raise TypeError(f"snapshot: found {type(snapshot)}; must be a {Snapshot.__name__}")
+        theirs, ours = snapshot.level, self.compiled.level
+        if theirs is not ours and theirs != ours:
+            other = "another" if theirs.name == ours.name else "one"
+            raise ValueError(
+                f"snapshot: found {other} of level {theirs.name!r}; this simulation plays "
+                f"{ours.name!r}"
+            )
+        if snapshot.preset != self.compiled.preset:
+            raise ValueError(
+                f"snapshot: found one of the physics {snapshot.preset}; this simulation has "
+                f"{self.compiled.preset}"
+            )
+        if snapshot.control_dt_s != self.config.control_dt_s:
+            raise ValueError(
+                f"snapshot: found one with control_dt_s {snapshot.control_dt_s:g}; this simulation "
+                f"has {self.config.control_dt_s:g}"
+            )
+        width = self._stepper.state.shape[1]
+        if snapshot.physics.shape[1:] != (width,):
+            raise ValueError(
+                f"snapshot: found physics of shape {snapshot.physics.shape}, of another version of "
+                f"MuJoCo or of the package; must be (n, {width})"
+            )
 
     def _table_of(self, rows: Int64) -> LevelTable:
         """Return the level data of ``rows``.

@@ -46,6 +46,14 @@ class CompiledLevel:
     gate_ctrl: Addresses
     ball_body: int
 
+    def __deepcopy__(self, memo: dict[int, object]) -> CompiledLevel:
+        """Return this: nothing of it ever changes."""
+        return self
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Be pickled as what it was compiled from, a fraction of the size."""
+        return compile_level, (self.level, self.preset)
+
 
 def compile_level(level: Level, physics: str | PhysicsPreset = "default") -> CompiledLevel:
     """Compile a level that `roller_env.level.load_level` has accepted.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import mujoco
 import numpy as np
@@ -54,6 +54,10 @@ class GameRenderer:
         self._size = (width, height)
         self._stage: Stage | None = None
         self._canvas: Canvas | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy draws the copied simulation, with an OpenGL context that it makes for itself."""
+        return {**self.__dict__, "_stage": None, "_canvas": None}
 
     def render(self, row: int, camera: int | Literal["game"] = "game") -> Picture:
         """Return a picture of the game in ``row``, (height, width, 3) uint8.

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import gymnasium as gym
 import numpy as np
@@ -15,19 +15,26 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
+from roller_env.checks import is_whole, nearest
+from roller_env.envs.arguments import seed_of
+from roller_env.envs.infos import rows_of
+from roller_env.envs.spaces import keys_to_action, row_of
 from roller_env.envs.vector import RollerVectorEnv
 from roller_env.level import Level
 from roller_env.simulation import Simulation, Snapshot
 
+TRUNCATED: Final = "TimeLimit.truncated"
+"""Key under which SB3 looks for whether time alone ended an episode."""
+
 
 @dataclass(frozen=True, eq=False)
 class VecSnapshot:
-    """All that the future of a `RollerVecEnv` depends on.
+    """All that the future of n rows of a `RollerVecEnv` depends on.
 
     Attributes:
-        games: of the simulation, every row.
-        returns: (N,) returns of the episodes under way.
-        lengths: (N,) their lengths, steps.
+        games: of the simulation.
+        returns: (n,) returns of the episodes under way.
+        lengths: (n,) their lengths, steps.
     """
 
     games: Snapshot
@@ -38,10 +45,12 @@ class VecSnapshot:
 class RollerVecEnv(VecEnv):
     """N games of one level for Stable-Baselines3.
 
-    An episode's last step returns the next one's first observation; ``infos[i]`` then holds
-    ``terminal_observation``, ``TimeLimit.truncated``, ``episode`` (return ``r``, length ``l``,
-    seconds ``t``, as `Monitor` writes it, so no monitor is needed) and the results ``success``,
-    ``score_percent``, ``coins``, ``time_s``, ``fall``, ``diverged``.
+    Every ``infos[i]`` holds what `RollerEnv` tells of the game, and ``TimeLimit.truncated``. An
+    episode's last step returns the next one's first observation; ``infos[i]`` is then the last of
+    the episode that ended, with ``terminal_observation`` and ``episode`` (return ``r``, length
+    ``l``, seconds ``t``, as `Monitor` writes it, so no monitor is needed).
+
+    It can be copied and pickled, and goes on with the same bits.
     """
 
     def __init__(
@@ -49,7 +58,7 @@ class RollerVecEnv(VecEnv):
         level: Any = "classic",
         num_envs: int = 64,
         *,
-        seed: int | None = None,
+        seed: int | np.integer[Any] | None = None,
         **options: Any,
     ):
         """Make ``num_envs`` games of ``level``.
@@ -59,10 +68,17 @@ class RollerVecEnv(VecEnv):
             num_envs: number of games.
             seed: row i is seeded with ``seed + i`` at the first reset.
             options: the other keywords of `roller_env.config.EnvConfig`.
+
+        Raises:
+            TypeError: there is no option of that name, or the seed is no whole number.
+            ValueError: an option's or the seed's value is not allowed.
+            LevelError: the level is not valid.
         """
+        seed = seed_of(seed)
         self.vector = RollerVectorEnv(
             num_envs, autoreset_mode=AutoresetMode.SAME_STEP, level=level, **options
         )
+        num_envs = self.vector.num_envs
         self._actions: Any = None
         self._returns = np.zeros(num_envs)
         self._lengths = np.zeros(num_envs, dtype=np.int64)
@@ -90,19 +106,20 @@ class RollerVecEnv(VecEnv):
         """Begin an episode in every row, with what `seed` and `set_options` were given.
 
         Raises:
-            ValueError: the rows were given different options.
+            TypeError: an option's type is wrong.
+            ValueError: an option is unknown, or its or a seed's value is not allowed.
         """
-        options = self._options[0]
-        if any(other != options for other in self._options):
-            raise ValueError(
-                f"options: found {self._options}; the rows share one environment, so they must "
-                "be the same for all of them"
-            )
-        observation, _ = self.vector.reset(seed=self._seeds, options=options)
+        first = self._options[0]
+        # set_options makes one mapping that all rows share, unless each is given its own.
+        if all(options is first or not (options or first) for options in self._options):
+            observation, info = self.vector.reset(seed=self._seeds, options=first)
+        else:
+            for row in range(self.num_envs):
+                observation, info = self._reset_vector(row, self._seeds[row], self._options[row])
         # The base class resets its seeds and options after use, as its other children do.
         self._reset_seeds()
         self._reset_options()
-        self.reset_infos = [{} for _ in range(self.num_envs)]
+        self.reset_infos = rows_of(info)
         self._returns[:] = 0.0
         self._lengths[:] = 0
         self._began = time.time()
@@ -114,75 +131,87 @@ class RollerVecEnv(VecEnv):
 
     def step_wait(self) -> VecEnvStepReturn:
         """Step every row with the actions kept, and reset the rows that are over."""
-        observation, reward, terminated, truncated, vector_info = self.vector.step(self._actions)
+        observation, reward, terminated, truncated, told = self.vector.step(self._actions)
         done = terminated | truncated
         self._returns += reward
         self._lengths += 1
-        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        infos = rows_of(told)
         rows = np.flatnonzero(done)
         if len(rows):
-            self._fill_infos(infos, rows, truncated & ~terminated, vector_info)
+            self._end_episodes(infos, rows, told)
+        for info, by_time_alone in zip(infos, (truncated & ~terminated).tolist(), strict=True):
+            info[TRUNCATED] = by_time_alone
         return observation, reward.astype(np.float32), done, infos
 
-    def _fill_infos(
+    def _end_episodes(
         self,
         infos: list[dict[str, Any]],
         rows: npt.NDArray[np.int64],
-        truncated: npt.NDArray[np.bool_],
-        vector_info: dict[str, Any],
+        told: dict[str, Any],
     ) -> None:
         """Write what SB3 expects at an episode's end, and begin the next one's count."""
-        results = vector_info["final_info"]
+        ended = rows_of(told["final_info"])
         elapsed = round(time.time() - self._began, 6)
         for row in rows:
-            info = {
-                name: values[row].item()
-                for name, values in results.items()
-                if not name.startswith("_")
-            }
-            info["terminal_observation"] = vector_info["final_obs"][row]
-            info["TimeLimit.truncated"] = bool(truncated[row])
+            self.reset_infos[row] = dict(infos[row])
+            info = ended[row]
+            info["terminal_observation"] = told["final_obs"][row]
             info["episode"] = {
                 "r": float(self._returns[row]),
                 "l": int(self._lengths[row]),
                 "t": elapsed,
             }
             infos[row] = info
+        self._begin_counts(rows)
+
+    def _begin_counts(self, rows: Any) -> None:
         self._returns[rows] = 0.0
         self._lengths[rows] = 0
 
-    def snapshot(self) -> VecSnapshot:
-        """Return the state of all rows, also in the middle of episodes, as copies."""
-        return VecSnapshot(self.simulation.snapshot(), self._returns.copy(), self._lengths.copy())
+    def get_state(self, rows: npt.ArrayLike | None = None) -> VecSnapshot:
+        """Return all that the future of ``rows`` (all, if None) depends on; it can be pickled.
 
-    def restore(self, snapshot: VecSnapshot) -> None:
-        """Put all rows back to a snapshot; the same actions then give the same bits.
+        Args:
+            rows: (n,) row numbers.
+        """
+        numbers = np.arange(self.num_envs) if rows is None else np.asarray(rows)
+        games = self.vector.get_state(numbers)
+        return VecSnapshot(games, self._returns[numbers].copy(), self._lengths[numbers].copy())
+
+    def set_state(self, state: VecSnapshot, rows: npt.ArrayLike | None = None) -> None:
+        """Put a state of n rows into ``rows`` (all, if None); the same actions give the same bits.
 
         Raises:
-            ValueError: the snapshot is of another level or number of rows.
+            TypeError: it is no state.
+            ValueError: it is of another game, or of another number of rows.
         """
-        if len(snapshot.returns) != self.num_envs:
-            raise ValueError(
-                f"snapshot: found {len(snapshot.returns)} rows; this has {self.num_envs}"
-            )
-        self.simulation.restore(snapshot.games)
-        self._returns = snapshot.returns.copy()
-        self._lengths = snapshot.lengths.copy()
+        if not isinstance(state, VecSnapshot):
+            raise TypeError(f"state: found {type(state)}; must be what get_state() returns")
+        numbers = np.arange(self.num_envs) if rows is None else np.asarray(rows)
+        self.vector.set_state(state.games, numbers)
+        self._returns[numbers] = state.returns
+        self._lengths[numbers] = state.lengths
 
     def close(self) -> None:
         """Free what the environment holds."""
         self.vector.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """Return an attribute of the underlying vector environment once for each index.
+        """Return an attribute of the row's game for each index.
 
-        The rows share one environment object, so they share their attributes.
+        The spaces and the random generators are those of one game. The rows share all else, which
+        is the underlying vector environment's.
 
         Raises:
             AttributeError: there is no such attribute.
         """
+        rows = self._rows(indices)
+        if attr_name in ("action_space", "observation_space"):
+            return [getattr(self, attr_name) for _ in rows]
         value = getattr(self.vector, attr_name)
-        return [value for _ in self._rows(indices)]
+        if attr_name in ("np_random", "np_random_seed"):
+            return [value[row] for row in rows]
+        return [value for _ in rows]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
         """Set an attribute of the environment, which all rows share.
@@ -200,16 +229,59 @@ class RollerVecEnv(VecEnv):
     def env_method(
         self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any
     ) -> list[Any]:
-        """Call a method for each index; ``render`` and ``picture`` are of the row's own picture.
+        """Call a method of one game for each index.
+
+        ``reset(seed=..., options=...)``, ``get_state()``, ``set_state(state)`` and ``render()`` do
+        to the row what they do to a `RollerEnv`; ``picture()`` draws it without a render mode too,
+        and ``get_keys_to_action()`` is the same for all.
 
         Raises:
-            AttributeError: there is no such method.
+            AttributeError: one game has no such method.
+            ValueError: it can be called for all rows together only.
         """
         rows = self._rows(indices)
-        if method_name in ("render", "picture"):
-            return [self.vector.picture(row) for row in rows]
-        method = getattr(self.vector, method_name)
-        return [method(*args, **kwargs) for _ in rows]
+        if method_name in ("step", "close"):
+            raise ValueError(
+                f"env_method: the rows share one environment, so {method_name!r} can be done to "
+                "all of them only; call it on this environment"
+            )
+        methods: dict[str, Callable[..., Any]] = {
+            "reset": self._reset_row,
+            "get_state": lambda row: self.get_state([row]),
+            "set_state": lambda row, state: self.set_state(state, [row]),
+            "render": self._picture_or_warning,
+            "picture": self.vector.picture,
+            "get_keys_to_action": lambda row: keys_to_action(self.vector.config.action),
+        }
+        if method_name not in methods:
+            raise AttributeError(
+                f"env_method: one game has no method {method_name!r}; there are "
+                f"{', '.join(methods)}{nearest(method_name, methods)}"
+            )
+        return [methods[method_name](row, *args, **kwargs) for row in rows]
+
+    def _reset_row(
+        self, row: int, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        observation, info = self._reset_vector(row, seed, options)
+        self._begin_counts(row)
+        self.reset_infos[row] = rows_of(info)[row]
+        return row_of(observation, row), dict(self.reset_infos[row])
+
+    def _reset_vector(
+        self, row: int, seed: int | None, options: dict[str, Any] | None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode in one row; return what the vector returns."""
+        mask = np.arange(self.num_envs) == row
+        seeds = [seed if chosen else None for chosen in mask]
+        return self.vector.reset(seed=seeds, options={**(options or {}), "reset_mask": mask})
+
+    def _picture_or_warning(self, row: int) -> npt.NDArray[np.uint8] | None:
+        """Return a row's picture if there is a render mode; else warn, as `RollerEnv.render`."""
+        if self.vector.render_mode is None:
+            self.vector.render()
+            return None
+        return self.vector.picture(row)
 
     def env_is_wrapped(
         self, wrapper_class: type[gym.Wrapper[Any, Any, Any, Any]], indices: VecEnvIndices = None
@@ -226,6 +298,9 @@ class RollerVecEnv(VecEnv):
             return [None] * self.num_envs
         return [self.vector.picture(row) for row in range(self.num_envs)]
 
-    def _rows(self, indices: VecEnvIndices) -> Iterable[int]:
-        rows: list[int] = list(self._get_indices(indices))
-        return rows
+    def _rows(self, indices: VecEnvIndices) -> list[int]:
+        """Return the rows that are meant; a negative index counts from the end, as in a list."""
+        if is_whole(indices):
+            indices = [indices]
+        numbers = range(self.num_envs)
+        return [numbers[index] for index in self._get_indices(indices)]

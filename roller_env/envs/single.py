@@ -7,12 +7,16 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
+from gymnasium.envs.registration import EnvSpec
 
 from roller_env.config import EnvConfig, make_config
 from roller_env.drawing.renderer import GameRenderer
 from roller_env.envs import spaces
+from roller_env.envs.arguments import reset_of, seed_of
+from roller_env.envs.infos import single_info
+from roller_env.envs.specs import plain_spec
 from roller_env.game.actions import forces
-from roller_env.simulation import Simulation
+from roller_env.simulation import Simulation, Snapshot
 
 
 class RollerEnv(gym.Env[Any, Any]):
@@ -22,8 +26,13 @@ class RollerEnv(gym.Env[Any, Any]):
     with the observation's entries and the order of events in a step.
 
     The episode ends (``terminated``) at the finish, after a fall and when the physics diverges,
-    and is cut off (``truncated``) at the level's time limit. The last ``info`` holds ``success``,
-    ``score_percent``, ``coins``, ``time_s``, ``fall`` and ``diverged``.
+    and is cut off (``truncated``) at the level's time limit. Every ``info`` holds how the game
+    stands: ``success`` (and ``is_success``, as Stable-Baselines3 calls it), ``score_percent``,
+    ``coins``, ``time_s``, ``fall`` and ``diverged``.
+
+    An environment is a value: it can be copied and pickled in the middle of an episode, and the
+    copy goes on with the same bits, its random generator included. A picture's OpenGL context is
+    not copied; the copy makes its own.
 
     Version history:
         v0: first version.
@@ -36,16 +45,28 @@ class RollerEnv(gym.Env[Any, Any]):
         """Make the environment; see `roller_env.config.EnvConfig` for the options.
 
         Raises:
-            ValueError: an option is unknown or its value is not allowed.
+            TypeError: there is no option of that name.
+            ValueError: an option's value is not allowed.
             LevelError: the level is not valid.
         """
         self.config: EnvConfig = make_config(**{"num_threads": 1, **options})
+        self._spec: EnvSpec | None = None
         self.simulation = Simulation(self.config, num_envs=1)
         self.action_space = spaces.action_space(self.config)
         self.observation_space = spaces.observation_space(self.config)
         self.render_mode = self.config.render_mode
         self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.control_dt_s)}
         self._renderer: GameRenderer | None = None
+        self.simulation.seed([self.np_random])
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What Gymnasium made it from; `EnvSpec.to_json` can write it."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = plain_spec(spec, self.config.to_json())
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -54,12 +75,19 @@ class RollerEnv(gym.Env[Any, Any]):
 
         Args:
             seed: seeds the environment's generator, as Gymnasium says.
-            options: ``{"intro": True}`` lets the keys work only after the original's 6 s.
+            options: of how the episode begins; docs/environments.md has them: ``intro``, ``state``,
+                ``position``, ``velocity``, ``angular_velocity``, ``coins``.
+
+        Raises:
+            TypeError: the seed's or an option's type is wrong.
+            ValueError: an option is unknown, or its or the seed's value is not allowed. Nothing
+                has changed then.
         """
-        super().reset(seed=seed)
+        wanted = reset_of(options, self.simulation, batched=False)
+        super().reset(seed=seed_of(seed))
         self.simulation.seed([self.np_random])
-        self.simulation.reset(intro=bool((options or {}).get("intro", False)))
-        return self._observation(), {}
+        wanted.apply(self.simulation)
+        return self._observation(), single_info(self.simulation)
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Advance by one control step.
@@ -73,11 +101,24 @@ class RollerEnv(gym.Env[Any, Any]):
         force = forces(self.config.action, np.asarray(action)[None])
         transition = self.simulation.step(force)
         terminated, truncated = bool(transition.terminated[0]), bool(transition.truncated[0])
-        info: dict[str, Any] = {}
-        if terminated or truncated:
-            results = self.simulation.results(np.array([0]))
-            info = {name: value[0].item() for name, value in results.items()}
+        info = single_info(self.simulation)
         return self._observation(), float(transition.reward[0]), terminated, truncated, info
+
+    def get_state(self) -> Snapshot:
+        """Return all that the future depends on, the generator included; it can be pickled."""
+        return self.simulation.snapshot()
+
+    def set_state(self, state: Snapshot) -> None:
+        """Go back to a state of this or of another environment that plays the same game.
+
+        The same actions then give the same bits, also through later resets. For a new episode that
+        begins in a state, with this environment's own generator, see ``reset(options=...)``.
+
+        Raises:
+            TypeError: it is no state.
+            ValueError: it is of another level, physics preset or control step, or of more rows.
+        """
+        self.simulation.restore(state, np.array([0]))
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Return a picture, (height, width, 3) uint8, or None without a render mode."""

@@ -47,6 +47,13 @@ def shape_observation(config: EnvConfig, vectors: npt.NDArray[np.float32]) -> An
     return vectors
 
 
+def row_of(observation: Any, row: int) -> Any:
+    """Return a copy of one row of a batched observation."""
+    if isinstance(observation, dict):
+        return {name: values[row].copy() for name, values in observation.items()}
+    return observation[row].copy()
+
+
 def action_of_keys(mode: ActionMode, held: str) -> Any:
     """Return the action that holding the keys in ``held``, letters of "wasd", stands for.
 

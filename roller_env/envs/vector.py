@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from difflib import get_close_matches
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
+from roller_env.checks import nearest
 from roller_env.config import EnvConfig, make_config
 from roller_env.drawing.renderer import GameRenderer
 from roller_env.envs import spaces
+from roller_env.envs.arguments import reset_of, seeds_of
+from roller_env.envs.infos import vector_info
+from roller_env.envs.specs import plain_spec
 from roller_env.game.actions import forces
-from roller_env.simulation import Simulation
+from roller_env.simulation import Simulation, Snapshot
 
 Bool = npt.NDArray[np.bool_]
 Float64 = npt.NDArray[np.float64]
@@ -29,10 +33,15 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
 
     Autoreset as Gymnasium defines it. NEXT_STEP: the step after an episode's last ignores its
     action and returns the reset observation with reward 0. SAME_STEP: the last step returns the
-    reset observation, with the last one in ``info["final_obs"]`` and the episode's results in
+    reset observation, with the last one in ``info["final_obs"]`` and the episode's last info in
     ``info["final_info"]``. DISABLED: the caller resets rows with
     ``reset(options={"reset_mask": mask})``.
+
+    Infos are those of `RollerEnv`, as arrays of (N,). Like that it can be copied and pickled.
     """
+
+    # Before Gymnasium 1.3 its __del__ closes also what its options kept from being made.
+    _renderer: GameRenderer | None = None
 
     def __init__(
         self,
@@ -44,44 +53,71 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         """Make ``num_envs`` games; see `roller_env.config.EnvConfig` for the options.
 
         Raises:
-            ValueError: an option is unknown or its value is not allowed.
+            TypeError: there is no option of that name.
+            ValueError: an option's value is not allowed.
             LevelError: the level is not valid.
         """
         self.config: EnvConfig = make_config(**options)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
-        self.num_envs = num_envs
+        self._spec: EnvSpec | None = None
         self.simulation = Simulation(self.config, num_envs)
+        self.num_envs = self.simulation.num_envs
         self.single_action_space = spaces.action_space(self.config)
         self.single_observation_space = spaces.observation_space(self.config)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.render_mode = self.config.render_mode
         self.metadata = {
             "render_modes": ["rgb_array"],
             "render_fps": round(1.0 / self.config.control_dt_s),
             "autoreset_mode": self.autoreset_mode,
         }
-        self._generators: list[np.random.Generator] | None = None
-        self._renderer: GameRenderer | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What Gymnasium made it from; `EnvSpec.to_json` can write it."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        plain = {**self.config.to_json(), "autoreset_mode": self.autoreset_mode.name}
+        self._spec = plain_spec(spec, plain)
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """The random generator of each row."""
+        return self.simulation.generators
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """What each row's generator was seeded with."""
+        return tuple(_seed_of(generator) for generator in self.simulation.generators)
 
     def reset(
         self,
         *,
-        seed: int | Sequence[int | None] | None = None,
+        seed: int | Sequence[int | None] | Int64 | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode in every row, or in those of ``options["reset_mask"]``.
 
         Args:
-            seed: an integer s seeds row i with s + i; a sequence has one a row; None goes on with
-                the generators there are, which at first are seeded by the operating system.
-            options: ``reset_mask``, (N,) bool: the rows to reset; ``intro``: see `RollerEnv`.
+            seed: an integer s seeds row i with s + i; a sequence or array has one a row; None goes
+                on with the generators there are, which at first are seeded by the operating system.
+            options: ``reset_mask``, (N,) bool: the rows to reset; and those of `RollerEnv`, for
+                all rows or, as (N, ...), with a value for each.
+
+        Raises:
+            TypeError: the seed's or an option's type is wrong.
+            ValueError: an option is unknown, or its or the seed's value is not allowed. Nothing
+                has changed then.
         """
-        options = options or {}
-        rows = self._rows_to_reset(options.get("reset_mask"))
-        self._seed(seed, rows)
-        self.simulation.reset(rows, intro=bool(options.get("intro", False)))
-        return self._observation(), {}
+        wanted = reset_of(options, self.simulation, batched=True)
+        seeds = seeds_of(seed, self.num_envs)
+        self._seed({int(row): seeds[row] for row in wanted.rows})
+        wanted.apply(self.simulation)
+        rows = None if len(wanted.rows) == self.num_envs else wanted.rows
+        return self._observation(), vector_info(self.simulation, rows)
 
     def step(self, actions: Any) -> tuple[Any, Float64, Bool, Bool, dict[str, Any]]:
         """Advance every row by one control step, resetting rows as the autoreset mode says.
@@ -90,28 +126,43 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
             ValueError: the actions are not in the action space.
             gymnasium.error.ResetNeeded: `reset` was never called, or (DISABLED) a row is over.
         """
-        if self._generators is None:
-            raise gym.error.ResetNeeded("step: no episode is under way; call reset() first")
         force = forces(self.config.action, actions)
         if len(force) != self.num_envs:
             raise ValueError(f"actions: found {len(force)} rows; needed are {self.num_envs}")
         over = self.simulation.state.over
-        if over.any() and self.autoreset_mode is AutoresetMode.NEXT_STEP:
-            self.simulation.reset(np.flatnonzero(over))
+        if over.any():
+            self._reset_before(over)
             transition = self.simulation.step(force, hold=over)
-        elif over.any():
-            raise gym.error.ResetNeeded(
-                f"step: rows {np.flatnonzero(over).tolist()} are over; reset them first with "
-                "reset(options={'reset_mask': mask})"
-            )
         else:
             transition = self.simulation.step(force)
         done = np.flatnonzero(transition.terminated | transition.truncated)
-        info = self._results(done) if len(done) else {}
         observation = self._observation()
         if len(done) and self.autoreset_mode is AutoresetMode.SAME_STEP:
-            observation, info = self._reset_now(done, observation, info)
+            observation, info = self._reset_now(done, observation)
+        else:
+            info = vector_info(self.simulation)
         return observation, transition.reward, transition.terminated, transition.truncated, info
+
+    def get_state(self, rows: npt.ArrayLike | None = None) -> Snapshot:
+        """Return all that the future of ``rows`` (all, if None) depends on; it can be pickled.
+
+        Args:
+            rows: (n,) row numbers.
+        """
+        return self.simulation.snapshot(None if rows is None else np.asarray(rows))
+
+    def set_state(self, state: Snapshot, rows: npt.ArrayLike | None = None) -> None:
+        """Put a state of n rows, of this or of another environment, into ``rows`` (all, if None).
+
+        The same actions then give the same bits as they did there, also through later resets.
+
+        Raises:
+            TypeError: it is no state.
+            ValueError: it is of another level, physics preset or control step, or of more or fewer
+                rows; `Snapshot.take` picks and repeats rows.
+        """
+        every = np.arange(self.num_envs) if rows is None else np.asarray(rows)
+        self.simulation.restore(state, every)
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """Return a picture of every row, or None without a render mode."""
@@ -132,37 +183,27 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
             self._renderer.close()
             self._renderer = None
 
-    def _rows_to_reset(self, mask: Any) -> Int64:
-        if mask is None:
-            return np.arange(self.num_envs)
-        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-            raise TypeError(f"options['reset_mask']: found {type(mask)}; must be a bool array")
-        if mask.shape != (self.num_envs,):
-            raise ValueError(
-                f"options['reset_mask']: found shape {mask.shape}; must be ({self.num_envs},)"
-            )
-        return np.flatnonzero(mask)
-
-    def _seed(self, seed: int | Sequence[int | None] | None, rows: Int64) -> None:
-        if seed is None and self._generators is not None:
+    def _seed(self, seeds: dict[int, int | None]) -> None:
+        """Give rows new generators, where there is a seed for them."""
+        if all(seed is None for seed in seeds.values()):
             return
-        if seed is None or isinstance(seed, (int, np.integer)):
-            first = seed
-            seeds = [None if first is None else int(first) + row for row in range(self.num_envs)]
-        elif isinstance(seed, (Sequence, np.ndarray)):
-            seeds = list(seed)
-        else:
-            raise TypeError(f"seed: found {seed!r}; must be None, an integer or one for each row")
-        if len(seeds) != self.num_envs:
-            raise ValueError(
-                f"seed: found {len(seeds)} seeds; needed is one a row, {self.num_envs}"
-            )
-        generators = self._generators or [seeding.np_random(None)[0] for _ in seeds]
-        for row in rows:
-            if seeds[row] is not None:
-                generators[row] = seeding.np_random(seeds[row])[0]
-        self._generators = generators
+        generators = list(self.simulation.generators)
+        for row, seed in seeds.items():
+            if seed is not None:
+                generators[row] = seeding.np_random(seed)[0]
         self.simulation.seed(generators)
+
+    def _reset_before(self, over: Bool) -> None:
+        """Reset the rows that are over before a step, or refuse the step."""
+        if (over & (self.simulation.state.steps == 0)).any():
+            raise gym.error.ResetNeeded("step: no episode is under way; call reset() first")
+        rows = np.flatnonzero(over)
+        if self.autoreset_mode is not AutoresetMode.NEXT_STEP:
+            raise gym.error.ResetNeeded(
+                f"step: rows {rows.tolist()} are over; reset them first with "
+                "reset(options={'reset_mask': mask})"
+            )
+        self.simulation.reset(rows)
 
     def _observation(self, rows: Int64 | None = None) -> Any:
         if self.config.observation == "pixels":
@@ -170,26 +211,14 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
             return np.stack([self.picture(int(row)) for row in numbers])
         return spaces.shape_observation(self.config, self.simulation.observe(rows))
 
-    def _results(self, rows: Int64) -> dict[str, Any]:
-        """Return the results of the episodes that ended in ``rows``, as a vector info."""
-        info: dict[str, Any] = {}
-        ended = np.zeros(self.num_envs, dtype=bool)
-        ended[rows] = True
-        for name, values in self.simulation.results(rows).items():
-            info[name] = np.zeros(self.num_envs, dtype=values.dtype)
-            info[name][rows] = values
-            info[f"_{name}"] = ended
-        return info
-
-    def _reset_now(
-        self, rows: Int64, observation: Any, info: dict[str, Any]
-    ) -> tuple[Any, dict[str, Any]]:
+    def _reset_now(self, rows: Int64, observation: Any) -> tuple[Any, dict[str, Any]]:
         """Reset ``rows``; return the observations with theirs replaced, and the vector info."""
         final = np.full(self.num_envs, None, dtype=object)
         ended = np.zeros(self.num_envs, dtype=bool)
         ended[rows] = True
         for row in rows:
-            final[row] = _row(observation, row)
+            final[row] = spaces.row_of(observation, row)
+        final_info = vector_info(self.simulation, rows)
         self.simulation.reset(rows)
         fresh = self._observation(rows)
         if isinstance(observation, dict):
@@ -197,20 +226,21 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
                 values[rows] = fresh[name]
         else:
             observation[rows] = fresh
-        final_info = {
+        info = {
+            **vector_info(self.simulation),
             "final_obs": final,
             "_final_obs": ended,
-            "final_info": info,
-            "_final_info": ended,
+            "final_info": final_info,
+            "_final_info": ended.copy(),
         }
-        return observation, final_info
+        return observation, info
 
 
-def _row(observation: Any, row: int) -> Any:
-    """Return a copy of one row of a batched observation."""
-    if isinstance(observation, dict):
-        return {name: values[row].copy() for name, values in observation.items()}
-    return observation[row].copy()
+def _seed_of(generator: np.random.Generator) -> int:
+    sequence = generator.bit_generator.seed_seq
+    assert isinstance(sequence, np.random.SeedSequence)
+    assert isinstance(sequence.entropy, int)
+    return sequence.entropy
 
 
 def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
@@ -220,7 +250,6 @@ def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
         if mode in (candidate.name, candidate.value):
             return candidate
     names = [candidate.name for candidate in AutoresetMode]
-    near = get_close_matches(str(mode).upper(), names, n=1, cutoff=0.5)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
     allowed = ", ".join(map(repr, names))
+    hint = nearest(str(mode), names)
     raise ValueError(f"autoreset_mode: found {mode!r}; allowed are {allowed}{hint}")

@@ -6,7 +6,7 @@ with 1.41 times the force along the diagonal, and opposite keys cancel.
 
 from __future__ import annotations
 
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -44,7 +44,7 @@ def forces(mode: ActionMode, actions: npt.ArrayLike) -> Float64:
     Args:
         mode: ``directions``: (N,) integers 0 to 8, indices of `DIRECTIONS`; ``keys``: (N, 4) of 0
             and 1, one for each of `KEYS`; ``force``: (N, 2) from -1 to 1, in key forces along
-            world x and y. Numbers outside are clipped to that.
+            world x and y.
         actions: actions of that mode.
 
     Returns:
@@ -56,10 +56,7 @@ def forces(mode: ActionMode, actions: npt.ArrayLike) -> Float64:
     array = np.asarray(actions)
     if mode == "directions":
         if array.ndim != 1 or array.dtype.kind not in "iu":
-            raise ValueError(
-                f"actions: found shape {array.shape} of {array.dtype}; 'directions' takes (N,) "
-                "integers"
-            )
+            raise _refused(array, "'directions' takes (N,) integers")
         if len(array) and not (array.min() >= 0 and array.max() < len(DIRECTIONS)):
             raise ValueError(
                 f"actions: found {array.min()} to {array.max()}; 'directions' takes 0 to 8"
@@ -67,12 +64,22 @@ def forces(mode: ActionMode, actions: npt.ArrayLike) -> Float64:
         direction: Float64 = _DIRECTION_FORCES_N[array]
         return direction
     if mode == "keys":
-        if array.ndim != 2 or array.shape[1] != len(KEYS):
-            raise ValueError(f"actions: found shape {array.shape}; 'keys' takes (N, 4)")
-        pushed: Float64 = KEY_FORCE_N * ((array != 0) @ KEY_AXES)
+        if array.ndim != 2 or array.shape[1] != len(KEYS) or array.dtype.kind not in "biuf":
+            raise _refused(array, "'keys' takes (N, 4) of 0 and 1")
+        held = array != 0
+        strange = held & (array != 1)
+        if strange.any():
+            raise ValueError(f"actions: found {array[strange][0]}; 'keys' takes 0 and 1")
+        pushed: Float64 = KEY_FORCE_N * (held @ KEY_AXES)
         return pushed
-    if array.ndim != 2 or array.shape[1] != 2:
-        raise ValueError(f"actions: found shape {array.shape}; 'force' takes (N, 2)")
-    if not np.isfinite(array).all():
-        raise ValueError("actions: found a number that is not finite; 'force' takes -1 to 1")
-    return KEY_FORCE_N * np.clip(array.astype(np.float64), -1.0, 1.0)
+    if array.ndim != 2 or array.shape[1] != 2 or array.dtype.kind not in "iuf":
+        raise _refused(array, "'force' takes (N, 2) numbers")
+    # Written so that what is not a number is not inside either.
+    inside = np.abs(array) <= 1.0
+    if not inside.all():
+        raise ValueError(f"actions: found {array[~inside][0]}; 'force' takes -1 to 1")
+    return KEY_FORCE_N * array.astype(np.float64)
+
+
+def _refused(actions: npt.NDArray[Any], takes: str) -> ValueError:
+    return ValueError(f"actions: found shape {actions.shape} of {actions.dtype}; {takes}")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from numbers import Real
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from roller_env import checks
 from roller_env.game.compiled import compiled
 from roller_env.game.state import GameState
 from roller_env.game.sweep import Events
@@ -41,18 +41,17 @@ class RewardWeights:
     def __post_init__(self) -> None:
         """Refuse weights that are not finite numbers."""
         for name in self.__slots__:
-            value = getattr(self, name)
-            if not (isinstance(value, Real) and math.isfinite(value)):
-                raise ValueError(f"reward_weights.{name}: found {value!r}; must be a finite number")
+            value = checks.number(f"reward_weights.{name}", getattr(self, name))
+            object.__setattr__(self, name, value)
 
 
 def points_reward(events: Events, weights: RewardWeights) -> Float64:
     """Return the points, (N,), of a step's events: coins, finish, fall."""
     points = np.empty(len(events.points))
     _add_up(
-        float(weights.coin),
-        float(weights.finish),
-        float(weights.fall),
+        weights.coin,
+        weights.finish,
+        weights.fall,
         events.points,
         events.finished,
         events.fallen,

@@ -76,6 +76,30 @@ def check_level(level: Level, unit: Unit = "metre") -> list[Problem]:
     ]
 
 
+def obstacles(level: Level) -> tuple[Solid, ...]:
+    """Return what no ball may begin inside of: solids as they stand at first, and the finish."""
+    finish = level.finish
+    x, y, z = (edge / 2 for edge in finish.size)
+    block = Solid(finish.at, (x, y, z), rotation_matrix(0.0), "default", "the finish")
+    return (*_solid_at_the_start(level), block)
+
+
+def obstructions(level: Level, blocks: Sequence[Solid], positions: Float64) -> dict[int, str]:
+    """Return what a ball at each of ``positions`` would be inside of; empty where all are free.
+
+    Args:
+        level: whose ball it is.
+        blocks: its `obstacles`.
+        positions: (n, 3) ball centres, metres.
+
+    Returns:
+        For the index of each position that is not free, the field of the level that is there.
+    """
+    margin = max(level.ball.radius - CONTACT_TOLERANCE_M, 0.0)
+    inside = _inside(blocks, positions, margin)
+    return {int(index): block.source for block, indices in inside for index in indices}
+
+
 class _InUnit:
     """Writes lengths in the unit of the level's file."""
 

@@ -1,4 +1,4 @@
-"""YAML -> `Level`. A level that comes out of here is right in shape and in meaning.
+"""YAML, or plain data -> `Level`. A level that comes out of here is right in shape and in meaning.
 
 A file is judged in three stages: what YAML says (`yaml_tree`), whether every field is what its
 model allows (`schema`), what the level as a whole must mean (`check`). All problems of a stage are
@@ -9,7 +9,7 @@ not be read would make every plate that names it look wrong.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -22,32 +22,44 @@ from roller_env.level.check import Unit, check_level
 from roller_env.level.errors import LevelError, Problem, listed, quoted
 from roller_env.level.messages import explain
 from roller_env.level.schema import METRES_PER_UNIT, SCALE_KEY, Level
-from roller_env.level.yaml_tree import MAX_BYTES, Node, read_tree
+from roller_env.level.yaml_tree import MAX_BYTES, Node, plain_tree, read_tree
 
 SUFFIXES: Final = (".yaml", ".yml")
 
 
-def load_level(source: str | os.PathLike[str] | Level) -> Level:
+def load_level(source: str | os.PathLike[str] | Level | Mapping[str, Any]) -> Level:
     """Load and check a level.
 
     Args:
-        source: the name of a shipped level ("classic"), the path of a .yaml file, or a `Level`,
-            which is checked and returned as it is. A string is a path if it ends in .yaml or .yml
-            or holds a directory separator.
+        source: the name of a shipped level ("classic"), the path of a .yaml file, the fields of a
+            level file as a mapping, such as ``level.model_dump(mode="json")``, or a `Level`, which
+            is checked and returned as it is. A string is a path if it ends in .yaml or .yml or
+            holds a directory separator.
 
     Returns:
         The level, lengths in metres.
 
     Raises:
         LevelError: there is no such level, or it has problems; all of them are in ``problems``.
-        TypeError: ``source`` is none of the three.
+        TypeError: ``source`` is none of these.
     """
     if isinstance(source, Level):
         _refuse(check_level(source))
         return source
-    is_name = isinstance(source, str) and _is_name(source)
+    if isinstance(source, Mapping):
+        try:
+            return _level(plain_tree(source), "", "")
+        except LevelError as error:
+            raise LevelError(map(_without_a_place, error.problems)) from None
+    is_name = isinstance(source, str) and not is_path(source)
     path = _shipped_path(str(source)) if is_name else Path(source)
     return _parse_bytes(_read(path), str(path))
+
+
+def is_path(source: str) -> bool:
+    """Say whether `load_level` takes a text for a path, not for the name of a shipped level."""
+    separators = [mark for mark in (os.sep, os.altsep) if mark]
+    return source.endswith(SUFFIXES) or any(mark in source for mark in separators)
 
 
 def parse_level(text: str, filename: str = "<text>") -> Level:
@@ -63,7 +75,11 @@ def parse_level(text: str, filename: str = "<text>") -> Level:
     Raises:
         LevelError: the level has problems; all of them are in ``problems``.
     """
-    root = read_tree(text, filename)
+    return _level(read_tree(text, filename), text, filename)
+
+
+def _level(root: Node, text: str, filename: str) -> Level:
+    """Return the level that a tree says, if it is right in shape and in meaning."""
     unit = _unit(root)
     try:
         level = Level.model_validate(root.plain(), context={SCALE_KEY: METRES_PER_UNIT[unit]})
@@ -126,11 +142,6 @@ def _draft_07(schema: Any) -> Any:
     return said
 
 
-def _is_name(source: str) -> bool:
-    separators = [mark for mark in (os.sep, os.altsep) if mark]
-    return not source.endswith(SUFFIXES) and not any(mark in source for mark in separators)
-
-
 def _shipped_path(name: str) -> Path:
     known = shipped_levels()
     if name not in known:
@@ -177,6 +188,10 @@ def _unit(root: Node) -> Unit:
 def _placed(problem: Problem, root: Node, filename: str) -> Problem:
     line, column = root.position(problem.path)
     return replace(problem, filename=filename, line=line, column=column)
+
+
+def _without_a_place(problem: Problem) -> Problem:
+    return replace(problem, filename=None, line=None, column=None)
 
 
 def _in_file_order(problems: Iterable[Problem]) -> list[Problem]:

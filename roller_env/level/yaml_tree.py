@@ -9,9 +9,11 @@ and ``12:30`` are text, ``1e3`` is a number.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
+import numpy as np
 import yaml
 
 from roller_env.level.errors import FieldPath, LevelError, Problem, quoted
@@ -124,6 +126,38 @@ def read_tree(text: str, filename: str) -> Node:
             documents or no mapping, or is larger than the limits above.
     """
     return _Reader(text, filename).document()
+
+
+def plain_tree(mapping: Mapping[Any, Any]) -> Node:
+    """Return the tree of a level that is given as plain data instead of as text.
+
+    It has no lines and columns.
+
+    Raises:
+        LevelError: a key is no text, or it is larger than the limits above.
+    """
+    return _node_of(mapping, (), 1)
+
+
+def _node_of(value: Any, path: FieldPath, depth: int) -> Node:
+    if depth > MAX_DEPTH:
+        raise LevelError([Problem(path[:1], f"nested more than {MAX_DEPTH} levels deep")])
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    inner: list[Node] | dict[str, Node]
+    if isinstance(value, Mapping):
+        for key in value:
+            if not isinstance(key, str):
+                message = f"found {key!r} as the name of a field; wanted text"
+                raise LevelError([Problem(path, message)])
+        inner = {key: _node_of(item, (*path, key), depth + 1) for key, item in value.items()}
+        nodes = list(inner.values())
+    elif isinstance(value, list | tuple):
+        nodes = [_node_of(item, (*path, index), depth + 1) for index, item in enumerate(value)]
+        inner = nodes
+    else:
+        return Node(value, 0, 0, text=str(value))
+    return Node(inner, 0, 0, height=1 + max((node.height for node in nodes), default=0))
 
 
 class _Reader:

@@ -3,8 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from difflib import get_close_matches
-from typing import Final, Literal
+from typing import Final, Literal, get_args
+
+from roller_env import checks
+
+Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
+Cone = Literal["elliptic", "pyramidal"]
+Solver = Literal["Newton", "PGS", "CG"]
+
+MIN_DT_S: Final = 1e-5
+MAX_ITERATIONS: Final = 1000
+"""Limits of a preset, since a file must not be able to ask for days of work."""
+
+_LONGEST_NAME: Final = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,16 +33,45 @@ class PhysicsPreset:
             cheaper; it takes more iterations, above all where a gate presses on the ball.
         iterations: most iterations of the solver in a step.
         tolerance: improvement at which the solver stops before that.
+
+    Raises:
+        ValueError: a value is not allowed; the message says what is.
     """
 
     name: str
     dt_s: float
-    integrator: Literal["Euler", "implicit", "implicitfast", "RK4"] = "implicitfast"
-    cone: Literal["elliptic", "pyramidal"] = "elliptic"
+    integrator: Integrator = "implicitfast"
+    cone: Cone = "elliptic"
     impratio: float = 1.0
-    solver: Literal["Newton", "PGS", "CG"] = "Newton"
+    solver: Solver = "Newton"
     iterations: int = 20
     tolerance: float = 1e-8
+
+    def __post_init__(self) -> None:
+        """Refuse what MuJoCo cannot compute with, or not in any reasonable time."""
+        if not (isinstance(self.name, str) and 0 < len(self.name) <= _LONGEST_NAME):
+            raise ValueError(
+                f"physics.name: found {self.name!r}; must be text of 1 to {_LONGEST_NAME} "
+                "characters"
+            )
+        seconds = f"a number of seconds from {MIN_DT_S:g} to 1"
+        checked = {
+            "dt_s": checks.number("physics.dt_s", self.dt_s, MIN_DT_S, 1.0, seconds),
+            "integrator": checks.one_of(
+                "physics.integrator", self.integrator, get_args(Integrator)
+            ),
+            "cone": checks.one_of("physics.cone", self.cone, get_args(Cone)),
+            "impratio": checks.number(
+                "physics.impratio", self.impratio, 1e-6, 1e6, "a number from 1e-6 to 1e6"
+            ),
+            "solver": checks.one_of("physics.solver", self.solver, get_args(Solver)),
+            "iterations": checks.whole("physics.iterations", self.iterations, 1, MAX_ITERATIONS),
+            "tolerance": checks.number(
+                "physics.tolerance", self.tolerance, 0.0, 1.0, "a number from 0 to 1"
+            ),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
 
 
 FAST: Final = PhysicsPreset("fast", dt_s=1 / 120, solver="PGS", iterations=500)
@@ -73,10 +113,4 @@ def physics_preset(physics: str | PhysicsPreset) -> PhysicsPreset:
     """
     if isinstance(physics, PhysicsPreset):
         return physics
-    if physics not in PRESETS:
-        near = get_close_matches(physics, PRESETS, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else ""
-        raise ValueError(
-            f"physics: found {physics!r}; allowed are {', '.join(map(repr, PRESETS))}{hint}"
-        )
-    return PRESETS[physics]
+    return PRESETS[checks.one_of("physics", physics, tuple(PRESETS))]

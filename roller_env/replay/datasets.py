@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,9 +18,8 @@ import gymnasium as gym
 from roller_env import ENV_IDS, __version__
 from roller_env.config import EnvConfig
 from roller_env.envs.spaces import action_space, observation_space
-from roller_env.game.rewards import RewardWeights
 from roller_env.level import load_level
-from roller_env.physics.presets import PRESETS, PhysicsPreset
+from roller_env.physics.presets import PRESETS, physics_preset
 from roller_env.replay.contents import Replay, ReplayError
 from roller_env.replay.experience import Experience, experiences
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 _DATA_FORMAT: Final = "hdf5"
 _ANY_LEVEL: Final = "classic"
+_ANY_LEVEL_ID: Final = "Roller/Level-v0"
 
 
 def to_minari(
@@ -130,28 +131,26 @@ def check_prefix(prefix: str) -> None:
         ) from None
 
 
-def environment_spec(config: EnvConfig) -> gym.envs.registration.EnvSpec | None:
-    """Return the registered environment of a configuration, with the options that say it.
+def environment_spec(config: EnvConfig) -> gym.envs.registration.EnvSpec:
+    """Return the spec of the environment of a configuration, for `gymnasium.make` and for JSON.
 
-    None if they cannot be said in JSON, which is what a data set keeps: for a level that is not
-    shipped, a preset without a name, or weights of one's own.
+    It is of the level's own id if the level is a shipped one, and names what differs from the
+    options' defaults. The time limit is among them, so that it is the environment's own, which the
+    agent sees, and not Gymnasium's.
     """
+    usual, options = EnvConfig().to_json(), config.to_json()
     level = load_level(config.level)
-    ids = [name for name, options in ENV_IDS.items() if options.get("level") == level.name]
-    if not ids or load_level(level.name) != level or config.reward_weights != RewardWeights():
-        return None
-    physics = config.physics
-    if isinstance(physics, PhysicsPreset):
-        if PRESETS.get(physics.name) != physics:
-            return None
-        physics = physics.name
-    names = ("action", "observation", "reward", "discount", "control_dt_s", "max_episode_steps")
-    options = {name: getattr(config, name) for name in names} | {"physics": physics}
-    environment = gym.make(ids[0], **options)
-    try:
-        return environment.spec
-    finally:
-        environment.close()
+    ids = [name for name, fixed in ENV_IDS.items() if fixed.get("level") == level.name]
+    is_shipped = bool(ids) and load_level(level.name) == level
+    spec = gym.spec(ids[0] if is_shipped else _ANY_LEVEL_ID)
+    del usual["level"], options["num_threads"]
+    if is_shipped:
+        del options["level"]
+    preset = physics_preset(config.physics)
+    if PRESETS.get(preset.name) == preset:
+        options["physics"] = preset.name
+    told = {name: value for name, value in options.items() if value != usual.get(name)}
+    return replace(spec, kwargs={**spec.kwargs, **told})
 
 
 def _buffer(buffer: Any, experience: Experience) -> Any:

@@ -152,7 +152,10 @@ class TrainingConfig(_Frozen):
     def _environment_takes_these(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
         if "level" in options:
             raise ValueError("level is a field of the training itself; remove it here")
-        make_config(**_with_weights(options))
+        try:
+            make_config(**_with_weights(options))
+        except TypeError as error:  # an unknown option, which pydantic would let through
+            raise ValueError(str(error)) from None
         return options
 
     @property

@@ -118,7 +118,7 @@ class PracticeStarts(VecEnvWrapper):
     def snapshot(self) -> PracticeSnapshot:
         """Return the state of all rows and what was kept; it can be pickled."""
         return PracticeSnapshot(
-            environments=self.environments.snapshot(),
+            environments=self.environments.get_state(),
             games={waypoint: list(games) for waypoint, games in self._games.items()},
             waypoint=self._waypoint.copy(),
             from_start=self._from_start.copy(),
@@ -127,7 +127,7 @@ class PracticeStarts(VecEnvWrapper):
 
     def restore(self, snapshot: PracticeSnapshot) -> None:
         """Put everything back; the same actions then give the same bits."""
-        self.environments.restore(snapshot.environments)
+        self.environments.set_state(snapshot.environments)
         self._games = {waypoint: list(games) for waypoint, games in snapshot.games.items()}
         self._waypoint[:] = snapshot.waypoint
         self._from_start[:] = snapshot.from_start

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -105,7 +106,14 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"camera": 6}, r"camera: found 6; allowed are 'game', 0, 1, 2, 3, 4, 5"),
     ({"camera": True}, r"camera: found True; allowed"),
     ({"camera": "gane"}, r"camera: found 'gane'; .*did you mean 'game'"),
-    ({"reward_weights": {"coin": 1}}, r"reward_weights: found \{'coin': 1\}; must be"),
+    ({"reward_weights": 3}, r"reward_weights: found 3; must be a RewardWeights or a mapping"),
+    ({"reward_weights": {"coins": 1}}, r"reward_weights: .*'coins'; .*did you mean 'coin'"),
+    ({"reward_weights": {"coin": True}}, r"reward_weights.coin: found True; must be a finite"),
+    ({"physics": {"name": "mine"}}, r"physics: found no dt_s; must have it"),
+    ({"physics": {"name": "mine", "dt_s": 0}}, r"physics.dt_s: found 0; must be .* 1e-05 to 1"),
+    ({"physics": {"dt": 0.01}}, r"physics: found the unknown key 'dt'; .*did you mean 'dt_s'"),
+    ({"level": {"name": "mine"}}, r"start: missing; wanted"),
+    ({"level": b"flat"}, r"level: found b'flat'; must be"),
     ({"discount": 1.5}, r"discount: found 1.5; must be .*0 to 1"),
     ({"discount": float("nan")}, r"discount: found nan; must be .*0 to 1"),
     ({"discount": "0.9"}, r"discount: found '0.9'; must be .*0 to 1"),
@@ -116,6 +124,8 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"control_dt_s": "0.05"}, r"control_dt_s: found '0.05'; must be .*more than 0"),
     ({"physics": "defualt"}, r"physics: found 'defualt'; .*did you mean 'default'"),
     ({"physics": 3}, r"physics: found 3; allowed are 'fast'"),
+    ({"discount": np.array([0.5])}, r"discount: found array\(\[0.5\]\); must be"),
+    ({"discount": 10**400}, r"discount: found 1000.*; must be"),
     ({"max_episode_steps": 0}, r"max_episode_steps: found 0; must be .*from 1"),
     ({"max_episode_steps": 2.0}, r"max_episode_steps: found 2.0; must be a whole number"),
     ({"width": 8}, r"width: found 8; must be a whole number from 16 to 4096"),
@@ -125,8 +135,16 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"level": "clasic"}, r"'clasic'.*'classic'"),
     ({"level": None}, r"level: found None"),
     ({"level": 3}, r"level: found 3"),
-    ({"observaton": "rays"}, r"unknown option 'observaton'; .*did you mean 'observation'"),
-    ({"frame_skip": 4}, r"unknown option 'frame_skip'; options are level, action, "),
+    ({"reward": np.array(["points"])}, r"reward: found array"),
+]
+
+UNKNOWN: list[tuple[dict[str, Any], str]] = [
+    (
+        {"observaton": "rays"},
+        r"got an unexpected keyword argument 'observaton'; .*did you mean 'observation'",
+    ),
+    # What TorchRL offers every environment, and looks for in the answer.
+    ({"frameskip": 4}, r"got an unexpected keyword argument 'frameskip'; options are level, "),
 ]
 
 
@@ -134,18 +152,32 @@ BAD: list[tuple[dict[str, Any], str]] = [
 def test_a_bad_option_is_one_error_that_says_what_and_what_would_be_right(
     options: dict[str, Any], says: str
 ) -> None:
-    makers: list[Callable[[], Any]] = [
+    for make in makers(options):
+        with pytest.raises(ValueError, match=says) as caught:
+            make()
+        assert "\n" not in str(caught.value) or "level" in options
+
+
+@pytest.mark.parametrize(("options", "says"), UNKNOWN)
+def test_an_unknown_keyword_is_told_in_pythons_own_words(
+    options: dict[str, Any], says: str
+) -> None:
+    for make in makers(options):
+        with pytest.raises(TypeError, match=says):
+            make()
+
+
+def makers(options: dict[str, Any]) -> list[Callable[[], Any]]:
+    """Return all ways of making an environment with these options."""
+    ways: list[Callable[[], Any]] = [
         lambda: RollerEnv(**options),
         lambda: RollerVectorEnv(2, **options),
         lambda: RollerVecEnv(num_envs=2, **options),
         lambda: gym.make_vec("Roller/Level-v0", 2, **options),
     ]
     if "render_mode" not in options and "max_episode_steps" not in options:
-        makers.append(lambda: gym.make("Roller/Level-v0", **options))
-    for make in makers:
-        with pytest.raises(ValueError, match=says) as caught:
-            make()
-        assert "\n" not in str(caught.value)
+        ways.append(lambda: gym.make("Roller/Level-v0", **options))
+    return ways
 
 
 @pytest.mark.parametrize("name", RewardWeights.__slots__)
@@ -162,9 +194,71 @@ def test_a_number_of_games_that_is_none_is_refused(num_envs: Any) -> None:
             make()
 
 
-def test_numpys_whole_numbers_are_whole_numbers() -> None:
-    config = make_config(max_episode_steps=np.int64(5), width=np.int32(64))
-    assert (config.max_episode_steps, config.width) == (5, 64)
+def test_numpys_numbers_are_numbers_in_every_option() -> None:
+    number: Any = np.int64
+    config = make_config(
+        max_episode_steps=np.int64(5),
+        width=np.int32(64),
+        height=np.uint8(48),
+        camera=np.int64(2),
+        num_threads=np.int16(1),
+        discount=np.float64(0.5),
+        control_dt_s=np.float64(0.1),
+        action=np.str_("keys"),
+        reward_weights=RewardWeights(coin=np.float64(2.0)),
+        physics=PhysicsPreset("mine", dt_s=np.float64(0.01), iterations=number(30)),
+    )
+    plain = make_config(
+        max_episode_steps=5,
+        width=64,
+        height=48,
+        camera=2,
+        num_threads=1,
+        discount=0.5,
+        control_dt_s=0.1,
+        action="keys",
+        reward_weights=RewardWeights(coin=2.0),
+        physics=PhysicsPreset("mine", dt_s=0.01, iterations=30),
+    )
+    assert config == plain
+    assert json.dumps(config.to_json()) == json.dumps(plain.to_json())
+    assert RollerVectorEnv(number(2), level="flat").num_envs == 2
+    assert RollerVecEnv("flat", number(2)).num_envs == 2
+
+
+BAD_PRESETS: list[tuple[dict[str, Any], str]] = [
+    ({"dt_s": 0}, r"dt_s: found 0; must be a number of seconds from 1e-05 to 1"),
+    ({"dt_s": -0.01}, r"dt_s: found -0.01; must be"),
+    ({"dt_s": float("nan")}, r"dt_s: found nan; must be"),
+    ({"dt_s": float("inf")}, r"dt_s: found inf; must be"),
+    ({"dt_s": True}, r"dt_s: found True; must be"),
+    ({"dt_s": "0.01"}, r"dt_s: found '0.01'; must be"),
+    ({"dt_s": None}, r"dt_s: found None; must be"),
+    ({"integrator": "rk4"}, r"integrator: found 'rk4'; allowed are .*; did you mean 'RK4'"),
+    ({"integrator": "verlet"}, r"integrator: found 'verlet'; allowed are 'Euler', "),
+    ({"cone": "elliptical"}, r"cone: found 'elliptical'; .*did you mean 'elliptic'"),
+    ({"solver": "newton"}, r"solver: found 'newton'; .*did you mean 'Newton'"),
+    ({"solver": 2}, r"solver: found 2; allowed are 'Newton'"),
+    ({"impratio": 0.0}, r"impratio: found 0.0; must be"),
+    ({"impratio": float("nan")}, r"impratio: found nan; must be"),
+    ({"iterations": 0}, r"iterations: found 0; must be a whole number from 1 to 1000"),
+    ({"iterations": True}, r"iterations: found True; must be"),
+    ({"iterations": 20.0}, r"iterations: found 20.0; must be"),
+    ({"iterations": 10**9}, r"iterations: found 1000000000; must be"),
+    ({"tolerance": -1e-9}, r"tolerance: found -1e-09; must be"),
+    ({"tolerance": float("nan")}, r"tolerance: found nan; must be"),
+    ({"name": ""}, r"name: found ''; must be text"),
+    ({"name": 3}, r"name: found 3; must be text"),
+]
+
+
+@pytest.mark.parametrize(("values", "says"), BAD_PRESETS, ids=lambda value: str(value)[:30])
+def test_a_preset_is_checked_like_a_level(values: dict[str, Any], says: str) -> None:
+    given: dict[str, Any] = {"name": "mine", "dt_s": 0.01, **values}
+    with pytest.raises(ValueError, match=rf"^physics\.{says}"):
+        PhysicsPreset(**given)
+    with pytest.raises(ValueError, match=rf"^physics\.{says}"):
+        make_config(physics=given)
 
 
 def test_an_unknown_autoreset_mode_is_refused_with_those_there_are() -> None:
@@ -181,7 +275,10 @@ def test_an_unknown_autoreset_mode_is_refused_with_those_there_are() -> None:
         ("directions", -1, "takes 0 to 8"),
         ("directions", 1.0, "takes .* integers"),
         ("keys", np.zeros(3), r"'keys' takes \(N, 4\)"),
-        ("force", np.array([np.nan, 0.0]), "not finite"),
+        ("keys", np.array([np.nan, 0, 0, 7]), "found nan; 'keys' takes 0 and 1"),
+        ("force", np.array([np.nan, 0.0]), "found nan; 'force' takes -1 to 1"),
+        ("force", np.array([1.5, 0.0]), "found 1.5; 'force' takes -1 to 1"),
+        ("force", np.array([1j, 0.0]), "of complex128; 'force' takes"),
     ],
 )
 def test_an_action_outside_the_space_is_refused_before_any_physics(
@@ -193,6 +290,15 @@ def test_an_action_outside_the_space_is_refused_before_any_physics(
     with pytest.raises(ValueError, match=says):
         env.step(action)
     assert env.simulation.snapshot().physics.tobytes() == before.tobytes()
+    batch = np.array([action, action])
+    vector = RollerVectorEnv(2, level="flat", action=mode)
+    vector.reset(seed=0)
+    with pytest.raises(ValueError, match=says):
+        vector.step(batch)
+    games = RollerVecEnv("flat", 2, action=mode)
+    games.reset()
+    with pytest.raises(ValueError, match=says):
+        games.step(batch)
 
 
 def test_as_many_actions_as_rows_are_needed() -> None:

@@ -1,9 +1,13 @@
 from __future__ import annotations
 
+import copy
+import pickle
 import warnings
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
 import torch
@@ -11,8 +15,9 @@ from gymnasium.wrappers import TimeLimit
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.logger import KVWriter, Logger
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import DummyVecEnv, VecCheckNan, VecNormalize
+from stable_baselines3.common.vec_env import DummyVecEnv, VecCheckNan, VecEnv, VecNormalize
 
 from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.envs.single import RollerEnv
@@ -43,23 +48,21 @@ def test_it_does_what_stable_baselines_own_vector_of_monitored_games_does(observ
         assert done.tolist() == their_done.tolist()
         for row in range(ENVS):
             compare_infos(infos[row], their_infos[row], ended=bool(done[row]))
-            timed_out += infos[row].get("TimeLimit.truncated", False)
-            fell += infos[row].get("fall", False)
+            timed_out += infos[row]["TimeLimit.truncated"]
+            fell += infos[row]["fall"]
+        assert ours.reset_infos == theirs.reset_infos
     assert min(fell, timed_out) > 1
 
 
 def compare_infos(found: dict[str, Any], expected: dict[str, Any], ended: bool) -> None:
-    """Compare all that an episode's last info says; SB3 has one key in the others too."""
-    if not ended:
-        assert found == {}
-        assert expected == {"TimeLimit.truncated": False}
-        return
+    """Compare all that an info says."""
     found, expected = dict(found), dict(expected)
-    last, their_last = found.pop("terminal_observation"), expected.pop("terminal_observation")
-    assert bytes_of(last) == bytes_of(their_last)
-    episode, their_episode = found.pop("episode"), expected.pop("episode")
-    assert episode["r"] == pytest.approx(their_episode["r"], abs=1e-6)
-    assert (episode["l"], set(episode)) == (their_episode["l"], set(their_episode))
+    if ended:
+        last, their_last = found.pop("terminal_observation"), expected.pop("terminal_observation")
+        assert bytes_of(last) == bytes_of(their_last)
+        episode, their_episode = found.pop("episode"), expected.pop("episode")
+        assert episode["r"] == pytest.approx(their_episode["r"], abs=1e-6)
+        assert (episode["l"], set(episode)) == (their_episode["l"], set(their_episode))
     assert found == expected
 
 
@@ -97,8 +100,17 @@ def test_options_reach_the_next_reset_only() -> None:
     assert env.simulation.state.control_delay_s.tolist() == [6.0, 6.0]
     env.reset()
     assert env.simulation.state.control_delay_s.tolist() == [0.0, 0.0]
-    env.set_options([{"intro": True}, {}])
-    with pytest.raises(ValueError, match="options"):
+
+
+def test_each_row_can_be_given_options_of_its_own() -> None:
+    env, plain = RollerVecEnv("flat", 2, seed=0), RollerVecEnv("flat", 2, seed=0)
+    env.set_options([{"intro": True}, {"position": (1.0, 0.5, 0.5)}])
+    observation, usual = env.reset(), plain.reset()
+    assert env.simulation.state.control_delay_s.tolist() == [6.0, 0.0]
+    assert env.simulation.ball_position[1].tolist() == [1.0, 0.5, 0.5]
+    assert row_of(observation, 0).tobytes() == row_of(usual, 0).tobytes()
+    env.set_options({"reset_maks": np.ones(2, dtype=bool)})
+    with pytest.raises(ValueError, match="did you mean 'reset_mask'"):
         env.reset()
 
 
@@ -118,8 +130,191 @@ def test_attributes_and_methods_are_found_as_callbacks_look_for_them() -> None:
     assert env.env_is_wrapped(Monitor, indices=[0]) == [True]
 
 
-def test_without_a_render_mode_there_are_no_images() -> None:
-    assert list(RollerVecEnv(num_envs=2, **OPTIONS).get_images()) == [None, None]
+def test_attributes_of_a_game_are_the_rows_own() -> None:
+    env = RollerVecEnv(num_envs=3, seed=5, **OPTIONS)
+    env.reset()
+    theirs = DummyVecEnv([lambda: RollerEnv(**OPTIONS)] * 3)
+    theirs.seed(5)
+    theirs.reset()
+    for name in ("action_space", "observation_space", "np_random_seed", "render_mode"):
+        assert env.get_attr(name) == theirs.get_attr(name), name
+        assert env.get_attr(name, indices=[2]) == theirs.get_attr(name, indices=[2]), name
+    states = [generator.bit_generator.state for generator in env.get_attr("np_random")]
+    assert states == [g.bit_generator.state for g in theirs.get_attr("np_random")]
+
+
+def test_a_row_is_reset_alone_as_stable_baselines_own_vector_does_it() -> None:
+    ours = RollerVecEnv(num_envs=3, seed=SEED, **OPTIONS)
+    theirs = DummyVecEnv([lambda: Monitor(RollerEnv(**OPTIONS))] * 3)
+    theirs.seed(SEED)
+    ours.reset()
+    theirs.reset()
+    for step, action in zip(range(120), wandering_actions(3, SEED), strict=False):
+        if step == 40:
+            ways: list[dict[str, Any]] = [{}, {"seed": 3}, {"options": {"intro": True}}]
+            for arguments in ways:
+                ((found, info),) = ours.env_method("reset", indices=[1], **arguments)
+                ((expected, their_info),) = theirs.env_method("reset", indices=[1], **arguments)
+                assert bytes_of(found) == bytes_of(expected)
+                assert info == their_info
+        found, reward, done, infos = ours.step(action)
+        expected, their_reward, their_done, their_infos = theirs.step(action)
+        assert bytes_of(found) == bytes_of(expected)
+        assert (reward.tobytes(), done.tolist()) == (their_reward.tobytes(), their_done.tolist())
+        for row in range(3):
+            compare_infos(infos[row], their_infos[row], ended=bool(done[row]))
+
+
+def test_what_cannot_be_done_to_one_row_is_refused() -> None:
+    env = RollerVecEnv(num_envs=2, **OPTIONS)
+    env.reset()
+    for method in ("step", "close"):
+        with pytest.raises(ValueError, match=f"the rows share one environment, so '{method}'"):
+            env.env_method(method, indices=[0])
+    with pytest.raises(AttributeError, match=r"no method 'get_stat'; .*did you mean 'get_state'"):
+        env.env_method("get_stat")
+    with pytest.raises(IndexError):
+        env.env_method("reset", indices=[2])
+    assert len(env.env_method("reset", indices=np.int64(1))) == 1  # type: ignore[arg-type]
+    assert len(env.env_method("reset", indices=-1)) == 1
+
+
+def test_without_a_render_mode_nothing_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    env = RollerVecEnv(num_envs=2, **OPTIONS)
+    env.reset()
+
+    def draw(row: int) -> None:
+        pytest.fail(f"row {row} was drawn")
+
+    monkeypatch.setattr(env.vector, "picture", draw)
+    assert list(env.get_images()) == [None, None]
+    with pytest.warns(UserWarning, match="render_mode='rgb_array'"):
+        assert env.env_method("render") == [None, None]
+
+
+def test_a_seed_of_numpys_is_a_seed() -> None:
+    ours, plain = RollerVecEnv("flat", 2, seed=np.int64(3)), RollerVecEnv("flat", 2, seed=3)
+    assert ours.reset().tobytes() == plain.reset().tobytes()
+    ours.seed(np.int32(8))  # type: ignore[arg-type]
+    plain.seed(8)
+    assert ours.reset().tobytes() == plain.reset().tobytes()
+    for seed in (-1, 1.5, "3", True):
+        with pytest.raises((TypeError, ValueError), match="seed: found"):
+            RollerVecEnv("flat", 2, seed=seed)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("how", ["copied", "pickled", "restored"])
+def test_a_vector_for_training_goes_on_with_the_same_bits(how: str) -> None:
+    """In the middle of episodes, between step_async and step_wait, a seed waiting for the reset."""
+    one = RollerVecEnv(num_envs=3, seed=SEED, reward="shaped", **OPTIONS)
+    one.reset()
+    actions = wandering_actions(3, SEED)
+    for action, _ in zip(actions, range(70), strict=False):
+        one.step(action)
+    one.step_async(next(actions))
+    if how == "restored":
+        two = RollerVecEnv(num_envs=3, reward="shaped", **OPTIONS)
+        two.set_state(pickle.loads(pickle.dumps(one.get_state())))
+        two.step_async(one._actions)
+    else:
+        one.seed(77)
+        two = copy.deepcopy(one) if how == "copied" else pickle.loads(pickle.dumps(one))
+    ended = 0
+    for action, _ in zip(actions, range(100), strict=False):
+        found, expected = two.step_wait(), one.step_wait()
+        assert bytes_of(found[0]) == bytes_of(expected[0])
+        assert found[1].tobytes() == expected[1].tobytes()
+        for info, their_info, done in zip(found[3], expected[3], expected[2], strict=True):
+            compare_infos(info, their_info, ended=bool(done))
+        ended += int(expected[2].sum())
+        one.step_async(action)
+        two.step_async(action)
+    assert ended >= 3
+    assert two.reset().tobytes() == one.reset().tobytes()
+
+
+def test_a_row_of_a_vector_for_training_is_put_back_alone() -> None:
+    env = RollerVecEnv(num_envs=3, seed=SEED, **OPTIONS)
+    env.reset()
+    actions = list(zip(range(60), wandering_actions(3, SEED), strict=False))
+    for _, action in actions[:20]:
+        env.step(action)
+    (state,) = env.env_method("get_state", indices=[1])
+    first = [env.step(action) for _, action in actions[20:40]]
+    before = env.get_state()
+    env.env_method("set_state", state, indices=[1])
+    after = env.get_state()
+    assert (after.lengths - before.lengths).tolist() == [0, -20, 0]
+    for _, action in actions[20:40]:
+        (observation, *_), (seen, *_) = env.step(action), first.pop(0)
+        assert row_of(observation, 1).tobytes() == row_of(seen, 1).tobytes()
+    with pytest.raises(TypeError, match="get_state"):
+        env.set_state(state.games)
+    with pytest.raises(ValueError, match="rows"):
+        env.set_state(state)
+
+
+def test_monitored_games_in_stable_baselines_own_vector_can_be_copied_and_pickled() -> None:
+    one = DummyVecEnv([lambda: Monitor(gym.make("Roller/Bridge-v0", max_episode_steps=50))] * 2)
+    one.seed(3)
+    one.reset()
+    actions = wandering_actions(2)
+    for action, _ in zip(actions, range(30), strict=False):
+        one.step(action)
+    copies = [copy.deepcopy(one), pickle.loads(pickle.dumps(one))]
+    for action, _ in zip(actions, range(60), strict=False):
+        expected = one.step(action)
+        for other in copies:
+            found = other.step(action)
+            assert bytes_of(found[0]) == bytes_of(expected[0])
+            assert found[2].tolist() == expected[2].tolist()
+
+
+def test_a_monitor_finds_the_results_where_gymnasiums_time_limit_cuts(tmp_path: Path) -> None:
+    keys = ("success", "score_percent", "coins", "fall", "diverged")
+    env = Monitor(
+        gym.make("Roller/Flat-v0", max_episode_steps=3),
+        str(tmp_path / "log"),
+        info_keywords=keys,
+    )
+    for _ in range(2):
+        env.reset(seed=0)
+        ended = False
+        while not ended:
+            _, _, terminated, truncated, info = env.step(0)
+            ended = terminated or truncated
+        assert {key: info["episode"][key] for key in keys} == {key: info[key] for key in keys}
+    env.close()
+    assert "success" in (tmp_path / "log.monitor.csv").read_text()
+
+
+@pytest.mark.usefixtures("one_torch_thread")
+@pytest.mark.parametrize("kind", ["ours", "theirs"])
+def test_the_success_rate_is_logged(kind: str) -> None:
+    options = {**OPTIONS, "max_episode_steps": 16}
+    env: VecEnv = RollerVecEnv(num_envs=2, seed=0, **options)
+    if kind == "theirs":
+        env = DummyVecEnv([lambda: Monitor(RollerEnv(**options))] * 2)
+    agent = PPO("MlpPolicy", env, n_steps=32, batch_size=64, n_epochs=1, device="cpu")
+    logged: dict[str, Any] = {}
+    agent.set_logger(Logger(None, [_Keeps(logged)]))
+    agent.learn(128)
+    assert logged["rollout/success_rate"] == 0.0
+
+
+class _Keeps(KVWriter):
+    """Keeps what is logged."""
+
+    def __init__(self, logged: dict[str, Any]) -> None:
+        self._logged = logged
+
+    def write(
+        self, key_values: dict[str, Any], key_excluded: dict[str, tuple[str, ...]], step: int = 0
+    ) -> None:
+        self._logged.update(key_values)
+
+    def close(self) -> None:
+        pass
 
 
 @pytest.mark.usefixtures("opengl")

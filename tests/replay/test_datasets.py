@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.envs.registration import EnvSpec
 
 from roller_env.config import make_config
+from roller_env.game.actions import forces
 from roller_env.game.rewards import RewardWeights
-from roller_env.physics.presets import PhysicsPreset
-from roller_env.replay import ReplayError
+from roller_env.level import load_level
+from roller_env.physics.presets import PRESETS, PhysicsPreset, physics_preset
+from roller_env.replay import ReplayError, record_episode
 from roller_env.replay.datasets import (
     check_prefix,
     environment_spec,
@@ -91,18 +96,46 @@ def test_what_was_played_on_several_levels_becomes_a_data_set_of_each() -> None:
     assert to_minari_by_level(played[:1], "roller/human") == ["roller/human/flat-v1"]
 
 
-def test_an_environment_is_named_only_where_that_says_all_of_it() -> None:
+def test_a_spec_says_all_of_an_environment_and_no_more() -> None:
     spec = environment_spec(make_config(level="gate", physics="fast", reward="shaped"))
-    assert spec is not None
     assert spec.id == "Roller/Gate-v0"
-    assert spec.kwargs["physics"] == "fast"
-    for options in (
+    assert spec.kwargs == {"level": "gate", "physics": "fast", "reward": "shaped"}
+    every: list[dict[str, Any]] = [
+        {"level": "gate", "physics": PRESETS["fast"]},
         {"level": make_level()},
         {"level": make_level(name="gate")},
         {"level": "gate", "physics": PhysicsPreset("fast", dt_s=1 / 60)},
-        {"level": "gate", "reward_weights": RewardWeights(coin=2.0)},
-    ):
-        assert environment_spec(make_config(**options)) is None
+        {"level": "gate", "reward_weights": RewardWeights(coin=2.0), "max_episode_steps": 9},
+    ]
+    for options in every:
+        config = make_config(**options, num_threads=1)
+        spec = EnvSpec.from_json(environment_spec(config).to_json())
+        recovered: Any = gym.make(spec).unwrapped
+        assert replace(recovered.config, level="flat", physics="default") == replace(
+            config, level="flat", physics="default"
+        )
+        assert recovered.simulation.compiled.level == load_level(config.level)
+        assert recovered.simulation.compiled.preset == physics_preset(config.physics)
+
+
+def test_minari_recovers_an_environment_whose_options_are_objects() -> None:
+    level = make_level(name="mine")
+    config = make_config(
+        level=level,
+        physics=PhysicsPreset("mine", dt_s=0.01, integrator="Euler"),
+        reward_weights=RewardWeights(coin=2.0),
+        max_episode_steps=5,
+        num_threads=1,
+    )
+    played = record_episode(config, lambda simulation: forces("directions", [1]), seed=3)
+    to_minari([played], "roller/mine-v0")
+    data_set = minari.load_dataset("roller/mine-v0")
+    recovered = data_set.recover_environment()
+    assert recovered.unwrapped.config == config
+    (episode,) = data_set.iterate_episodes()
+    seen = [recovered.reset(seed=3)[0]]
+    seen.extend(recovered.step(action)[0] for action in episode.actions)
+    assert [o.tobytes() for o in seen] == [o.tobytes() for o in episode.observations]
 
 
 @pytest.mark.parametrize("prefix", ["x", "my games", "/roller", "roller/", ""])

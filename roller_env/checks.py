@@ -1,0 +1,123 @@
+"""What is asked of a value before anything is done with it, and the words in which it is refused.
+
+Each function returns the value as plain Python has it: NumPy's numbers are numbers here, and True
+is not 1. Every error reads ``name: found X; must be Y`` or ``name: found X; allowed are Y``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import MISSING, fields
+from difflib import get_close_matches
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any, TypeGuard, TypeVar
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+_Choice = TypeVar("_Choice", bound=str | int | None)
+_Record = TypeVar("_Record", bound="DataclassInstance")
+
+_LONG_TEXT = 64
+
+
+def one_of(name: str, value: object, allowed: Collection[_Choice]) -> _Choice:
+    """Return the allowed choice that ``value`` is.
+
+    Raises:
+        ValueError: it is none; the message says which there are and which is nearest.
+    """
+    if value is None or isinstance(value, str) or is_whole(value):
+        for choice in allowed:
+            if value == choice:
+                return choice
+    hint = nearest(str(value), [str(choice) for choice in allowed])
+    raise ValueError(f"{name}: found {value!r}; allowed are {', '.join(map(repr, allowed))}{hint}")
+
+
+def whole(name: str, value: object, low: int, high: int) -> int:
+    """Return a whole number from ``low`` to ``high``.
+
+    Raises:
+        ValueError: ``value`` is no such number.
+    """
+    if not is_whole(value) or not low <= int(value) <= high:
+        raise ValueError(f"{name}: found {value!r}; must be a whole number from {low} to {high}")
+    return int(value)
+
+
+def is_whole(value: object) -> TypeGuard[int]:
+    """Say whether a value is a whole number, Python's or NumPy's."""
+    return isinstance(value, Integral) and not isinstance(value, bool)
+
+
+def number(
+    name: str,
+    value: object,
+    low: float = -math.inf,
+    high: float = math.inf,
+    wanted: str = "a finite number",
+) -> float:
+    """Return a finite number from ``low`` to ``high``.
+
+    Args:
+        name: what the message calls it.
+        value: what was given.
+        low: least number allowed.
+        high: greatest number allowed.
+        wanted: the allowed numbers in words.
+
+    Raises:
+        ValueError: ``value`` is no such number.
+    """
+    if not isinstance(value, bool) and isinstance(value, Real):
+        try:
+            found = float(value)
+        except OverflowError:  # a whole number
+            found = math.inf
+        if math.isfinite(found) and low <= found <= high:
+            return found
+    raise ValueError(f"{name}: found {value!r}; must be {wanted}")
+
+
+def record(name: str, kind: type[_Record], value: object) -> _Record:
+    """Return a dataclass that is given as itself or as a mapping of its fields.
+
+    Raises:
+        ValueError: ``value`` is neither, or has a field that is unknown, missing or not allowed.
+    """
+    if isinstance(value, kind):
+        return value
+    known = {field.name: field.default is MISSING for field in fields(kind)}
+    if not isinstance(value, Mapping):
+        raise ValueError(
+            f"{name}: found {value!r}; must be a {kind.__name__} or a mapping with its fields "
+            f"{', '.join(known)}"
+        )
+    known_names(name, value, known)
+    missing = [field for field, is_needed in known.items() if is_needed and field not in value]
+    if missing:
+        raise ValueError(f"{name}: found no {' and no '.join(missing)}; must have it")
+    return kind(**value)
+
+
+def known_names(name: str, given: Mapping[Any, object], known: Collection[str]) -> None:
+    """Refuse a mapping with other keys than ``known``.
+
+    Raises:
+        ValueError: it has one; the message says which there are and which is nearest.
+    """
+    for key in given:
+        if key not in known:
+            raise ValueError(
+                f"{name}: found the unknown key {key!r}; allowed are {', '.join(known)}"
+                f"{nearest(str(key), known)}"
+            )
+
+
+def nearest(written: str, known: Collection[str]) -> str:
+    """Return ``; did you mean 'X'?``, or nothing where no known name is near."""
+    lower = {name.lower(): name for name in known}
+    near = get_close_matches(written[:_LONG_TEXT].lower(), lower, n=1)
+    return f"; did you mean {lower[near[0]]!r}?" if near else ""
