@@ -23,6 +23,7 @@ from roller_env.level.errors import LevelError
 from roller_env.level.messages import explain
 from roller_env.level.schema import METRES_PER_UNIT, SCALE_KEY, Level
 from roller_env.problems import Problem, listed, quoted
+from roller_env.regular_files import read_regular_file
 from roller_env.yaml_tree import MAX_BYTES, Node, YamlError, read_tree
 
 SUFFIXES: Final = (".yaml", ".yml")
@@ -146,22 +147,16 @@ def _shipped_path(name: str) -> Path:
 
 def _read(path: Path) -> bytes:
     try:
-        with path.open("rb") as file:
-            return file.read(MAX_BYTES + 1)
+        return read_regular_file(path, MAX_BYTES)
     except FileNotFoundError:
         levels = [other.name for suffix in SUFFIXES for other in path.parent.glob(f"*{suffix}")]
         problem = Problem((), "there is no such file", written=path.name, known=tuple(levels))
     except OSError as error:
-        problem = Problem((), f"the file cannot be read: {error.strerror}")
-    except ValueError as error:  # a NUL character in the path
-        problem = Problem((), f"the file cannot be read: {error}")
+        problem = Problem((), f"it cannot be read: {error.strerror}")
     raise LevelError([replace(problem, filename=str(path))])
 
 
 def _parse_bytes(data: bytes, filename: str) -> Level:
-    if len(data) > MAX_BYTES:
-        message = f"the file is too large; allowed are at most {MAX_BYTES} bytes"
-        raise LevelError([Problem((), message, filename)])
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 from pathlib import Path
 
@@ -139,6 +140,13 @@ def test_a_missing_file_gets_the_nearest_one_beside_it(tmp_path: Path) -> None:
 def test_a_path_that_cannot_be_a_file_is_a_level_error(name: str) -> None:
     with pytest.raises(LevelError):
         load_level(name if name != "." else Path(name))
+
+
+def test_a_pipe_as_a_level_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(pipe := tmp_path / "pipe.yaml")
+    with pytest.raises(LevelError) as caught:
+        load_level(pipe)
+    assert str(caught.value) == f"{pipe}: it cannot be read: found a pipe; wanted a regular file"
 
 
 def test_bytes_that_are_not_utf_8_are_placed(tmp_path: Path) -> None:
