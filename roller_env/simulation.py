@@ -140,13 +140,14 @@ class Simulation:
     def results(self, rows: Int64) -> dict[str, npt.NDArray[Any]]:
         """Return how the games in ``rows`` stand, arrays of (n,) by name.
 
-        ``success`` (the finish was reached), ``score_percent`` (coins of the level's, 0 to 100),
-        ``coins`` (collected), ``time_s``, ``fall`` and ``diverged``.
+        ``success`` (the finish was reached), ``score_percent`` (coins of the level's, 0 to 100;
+        without coins 100 for the finish), ``coins`` (collected), ``time_s``, ``fall`` and
+        ``diverged``.
         """
-        coins = self.state.points[rows]
+        coins, finished = self.state.points[rows], self.state.finished[rows]
         return {
-            "success": self.state.finished[rows],
-            "score_percent": score_percent(coins, self.table.coin_count[rows]),
+            "success": finished,
+            "score_percent": score_percent(coins, self.table.coin_count[rows], finished),
             "coins": coins,
             "time_s": self.time_s[rows],
             "fall": self.state.fallen[rows],

@@ -54,5 +54,6 @@ def test_a_socket_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_file_that_is_missing_is_told_apart(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError):
-        read_regular_file(tmp_path / "nothing", 10)
+    for name in ("nothing", "a\0b"):
+        with pytest.raises(FileNotFoundError, match="there is no such file"):
+            read_regular_file(tmp_path / name, 10)

@@ -111,8 +111,7 @@ def _plan_place(root: Node, path: FieldPath, text: str, found: dict[str, Any]) -
     if plan is None or not plan.is_block:
         return line, column
     lines = text.splitlines()
-    rows = [index for index in range(line, len(lines)) if lines[index].strip()]
-    row = rows[found["number"] - 1]
+    row = line + found["number"] - 1
     indent = len(lines[row]) - len(lines[row].lstrip())
     strange = lines[row].find(found.get("character", "''")[1:-1], indent)
     return row + 1, max(strange, indent) + 1

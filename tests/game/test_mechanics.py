@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from roller_env.game.rules import INTRO_S
-from roller_env.game.state import score_percent
 from roller_env.level import Level
 from roller_env.level.schema import Ball, Gate, LiftPad, Plate
 from tests.builders import BALL_RADIUS_M, GRAVITY, Game, coin, make_level, q, resting
@@ -397,12 +396,20 @@ def test_the_score_is_the_percentage_of_the_coins(taken: int, percent: float) ->
     assert results["coins"][0] == taken
 
 
-def test_a_level_without_coins_scores_100() -> None:
+def test_a_level_without_coins_scores_100_at_the_finish_and_nothing_before() -> None:
     game = Game(finish_level())
     with np.errstate(all="raise"):
+        assert game.simulation.results(np.array([0]))["score_percent"][0] == 0.0
         game.play(3.0, "w")
         assert game.simulation.results(np.array([0]))["score_percent"][0] == 100.0
-    np.testing.assert_array_equal(score_percent(np.array([0]), np.array([0])), [100.0])
+
+
+def test_a_fall_on_a_level_without_coins_scores_nothing() -> None:
+    game = Game(make_level(boxes=[{"at": (0.0, 0.0, -0.5), "size": (1.0, 1.0, 1.0)}]))
+    game.play(5.0, "w")
+    results = game.simulation.results(np.array([0]))
+    assert results["fall"][0]
+    assert results["score_percent"][0] == 0.0
 
 
 # Fall and reset -----------------------------------------------------------------------------------

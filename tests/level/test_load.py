@@ -401,7 +401,7 @@ BROKEN_FIELDS = {
     "ragged plan": (
         SMALL + CELLS + "      ###\n\n      ##\n",
         [
-            "13:7: floors[0].plan: row 2 of the plan has 2 characters, the first has 3; "
+            "13:7: floors[0].plan: row 3 of the plan has 2 characters, others have 3; "
             "draw empty cells as '.'"
         ],
     ),
