@@ -111,9 +111,11 @@ def apply(state: GameState, table: LevelTable, motion: Motion, events: Events) -
         state.plate_down,
         state.gate_opening,
     )
+    pads = table.slices[Kind.LIFT_PAD]
     _run_timers(
         motion.duration_s,
-        events.pads,
+        events.entry[:, pads],
+        table.pad_group,
         table.pad_duration_s,
         state.thrust_s,
         state.control_delay_s,
@@ -170,19 +172,38 @@ def _move_slabs(
 
 @compiled
 def _run_timers(
-    duration_s: float, entered: Bool, push_s: Float64, thrust_s: Float64, control_delay_s: Float64
+    duration_s: float,
+    entry: Float64,
+    group: Int64,
+    push_s: Float64,
+    thrust_s: Float64,
+    control_delay_s: Float64,
 ) -> None:
     """Let the timers of the intro and of pushing pads run, and start those of the pads entered.
 
-    A pad that is still pushing does not fire again, so that its push never lasts longer.
+    A pad that is still pushing does not fire again, so that its push never lasts longer; nor does
+    one of its group, so that a pad made of two pushes like one.
     """
     for row in range(thrust_s.shape[0]):
         control_delay_s[row] = max(control_delay_s[row] - duration_s, 0.0)
         for pad in range(thrust_s.shape[1]):
+            if entry[row, pad] < np.inf and _fires(pad, entry[row], group[row], thrust_s[row]):
+                thrust_s[row, pad] = -1.0  # until those behind it have been asked
+        for pad in range(thrust_s.shape[1]):
             left = thrust_s[row, pad]
-            if left <= 0.0 and entered[row, pad]:
+            if left < 0.0:
                 thrust_s[row, pad] = push_s[row, pad]
             else:
                 left -= duration_s
                 # Sums of control steps miss a timer's end by rounding: that is no time at all.
                 thrust_s[row, pad] = left if left >= 1e-9 else 0.0
+
+
+@compiled
+def _fires(pad: int, entry: Float64, group: Int64, thrust_s: Float64) -> bool:
+    """Say whether none of an entered pad's group is pushing or was entered before it."""
+    for other in range(len(group)):
+        first = entry[other] < entry[pad] or (entry[other] == entry[pad] and other < pad)
+        if group[other] == group[pad] and (thrust_s[other] > 0.0 or first):
+            return False
+    return True

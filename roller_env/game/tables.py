@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.game.cameras import TriggerKind
-from roller_env.level.expand import coin_positions
+from roller_env.level.expand import coin_positions, pad_groups
 from roller_env.level.schema import PLATE_HIT_HEIGHT_M, Level
 from roller_env.units import quants
 
@@ -79,6 +79,7 @@ class LevelTable:
     gate_speed: Float64  # (L, G)
     pad_force_n: Float64  # (L, A)
     pad_duration_s: Float64  # (L, A)
+    pad_group: Int64  # (L, A) number of the first pad of those that push as one; own, if alone
     trigger_kind: Int64  # (L, T)
     route: Float64  # (L, W, 3)
     route_arc: Float64  # (L, W) metres along the route up to each waypoint
@@ -149,6 +150,7 @@ class LevelTable:
             gate_speed=pad(lambda level: [g.speed for g in level.gates]),
             pad_force_n=pad(lambda level: [p.force_n for p in level.lift_pads]),
             pad_duration_s=pad(lambda level: [p.duration_s for p in level.lift_pads]),
+            pad_group=pad(pad_groups).astype(np.int64),
             trigger_kind=pad(
                 lambda level: [TriggerKind[t.kind.upper()] for t in level.camera_triggers]
             ).astype(np.int64),

@@ -330,13 +330,35 @@ def test_two_pads_have_timers_of_their_own_and_their_forces_add() -> None:
     np.testing.assert_allclose(rails.state.thrust_s, [[5.0 - 1.05, 5.0]])
 
 
-def test_two_pads_under_the_ball_push_with_both_forces() -> None:
-    half = {"size": q(36, 72, 4)}
-    pads = [PAD | half | {"at": q(-18, 0, 2)}, PAD | half | {"at": q(18, 0, 2)}]
-    game = Game(lift_level(lift_pads=pads))
+HALF = {"size": q(36, 72, 4)}
+LEFT, RIGHT = PAD | HALF | {"at": q(-18, 0, 2)}, PAD | HALF | {"at": q(18, 0, 2)}
+
+
+def test_two_pads_under_the_ball_that_do_not_touch_push_with_both_forces() -> None:
+    apart = [LEFT | {"at": q(-18.1, 0, 2)}, RIGHT | {"at": q(18.1, 0, 2)}]
+    game = Game(lift_level(lift_pads=apart))
     game.play(1.05)
     net = 2 * 12.7 - GRAVITY
     assert game.observed("velocity")[2] == pytest.approx(net, rel=0.01)
+
+
+@pytest.mark.parametrize("overlap", [0.0, 5.0, 36.0])
+def test_a_pad_split_in_two_throws_the_ball_as_high_as_a_whole_one(overlap: float) -> None:
+    game = Game(lift_level(lift_pads=[LEFT, RIGHT | {"at": q(18 - overlap, 0, 2)}]))
+    assert game.play(8.0)[:, 2].max() - BALL_RADIUS_M == pytest.approx(46.9, rel=0.02)
+
+
+def test_pads_that_touch_have_one_timer_and_the_first_one_entered_pushes() -> None:
+    strong = RIGHT | {"force_n": 40.0, "duration_s": 2.0}
+    rails = Rails(lift_level(lift_pads=[LEFT, strong], start={"at": q(100, 0, 20)}))
+    rails.go(q(-18, 0, 20))
+    np.testing.assert_array_equal(rails.state.thrust_s, [[0.0, 2.0]])
+    rails.go(q(-18, 0, 200), q(-18, 0, 20))
+    np.testing.assert_allclose(rails.state.thrust_s, [[0.0, 1.95]])
+    rails.go(q(-18, 0, 200))
+    rails.wait(2.0)
+    rails.go(q(-18, 0, 20))
+    np.testing.assert_array_equal(rails.state.thrust_s, [[5.0, 0.0]])
 
 
 def test_a_pad_is_solid() -> None:
