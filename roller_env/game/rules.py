@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.game import cameras
+from roller_env.game import cameras, slabs
 from roller_env.game.compiled import compiled
 from roller_env.game.state import GameState
 from roller_env.game.sweep import Events, Motion
@@ -34,8 +34,8 @@ class Controls:
 
     Attributes:
         force_n: (N, 3) mean force on the ball over the step, world frame.
-        plate_velocity: (N, P) m/s, down is negative.
-        gate_velocity: (N, G) m/s.
+        plate_velocity: (N, P) m/s at which what pulls the plates moves, down is negative.
+        gate_velocity: (N, G) likewise of the gates.
     """
 
     force_n: Float64
@@ -43,18 +43,29 @@ class Controls:
     gate_velocity: Float64
 
 
+def anything_moves(state: GameState) -> bool:
+    """Say whether a plate or gate of any game has been set going."""
+    return bool(state.plate_struck.any() or state.gate_opening.any())
+
+
 def controls(
-    state: GameState, table: LevelTable, key_force_n: Float64, duration_s: float
+    state: GameState,
+    table: LevelTable,
+    key_force_n: Float64,
+    placement: slabs.Placement | None,
+    duration_s: float,
 ) -> Controls:
     """Return what the actuators do in the next step, given the keys' force (N, 2).
+
+    ``placement`` is needed only where `anything_moves`.
 
     Timers that end within the step act for their share of it, so that no impulse depends on the
     length of the control step.
     """
     result = Controls(
         force_n=np.empty((len(key_force_n), 3)),
-        plate_velocity=np.empty(state.plate_struck.shape),
-        gate_velocity=np.empty(state.gate_opening.shape),
+        plate_velocity=np.zeros(state.plate_struck.shape),
+        gate_velocity=np.zeros(state.gate_opening.shape),
     )
     _push(
         duration_s,
@@ -64,8 +75,36 @@ def controls(
         table.pad_force_n,
         result.force_n,
     )
-    _lower(state.plate_struck, table.plate_speed, result.plate_velocity)
-    _lower(state.gate_opening, table.gate_speed, result.gate_velocity)
+    if placement is None:
+        return result
+    slabs.lower(
+        duration_s,
+        state.plate_struck,
+        table.plate_speed,
+        table.centres(Kind.PLATE),
+        table.halves(Kind.PLATE),
+        table.plate_heading,
+        placement.plate,
+        placement.plate_aim,
+        placement.ball,
+        placement.velocity,
+        table.ball_radius,
+        result.plate_velocity,
+    )
+    slabs.lower(
+        duration_s,
+        state.gate_opening,
+        table.gate_speed,
+        table.gate_centre,
+        table.gate_half,
+        table.gate_heading,
+        placement.gate,
+        placement.gate_aim,
+        placement.ball,
+        placement.velocity,
+        table.ball_radius,
+        result.gate_velocity,
+    )
     return result
 
 
@@ -87,14 +126,6 @@ def _push(
         force_n[row, 0] = key_force_n[row, 0] * held
         force_n[row, 1] = key_force_n[row, 1] * held
         force_n[row, 2] = lift
-
-
-@compiled
-def _lower(moves: Bool, speed: Float64, velocity: Float64) -> None:
-    """Write the velocities of slabs, (n, slabs): down, where they move."""
-    for row in range(moves.shape[0]):
-        for slab in range(moves.shape[1]):
-            velocity[row, slab] = -speed[row, slab] if moves[row, slab] else 0.0
 
 
 def apply(state: GameState, table: LevelTable, motion: Motion, events: Events) -> None:
