@@ -16,6 +16,7 @@ from roller_env import checks
 from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.config import MAX_ENVS, EnvConfig
 from roller_env.game import observations, rewards, rules, sweep
+from roller_env.game.slabs import Placement
 from roller_env.game.state import GameState, score_percent
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level, load_level
@@ -225,14 +226,15 @@ class Simulation:
     def results(self, rows: Int64 | None = None) -> dict[str, npt.NDArray[Any]]:
         """Return how the games in ``rows`` (all, if None) stand, arrays of (n,) by name.
 
-        ``success`` (the finish was reached), ``score_percent`` (coins of the level's, 0 to 100),
-        ``coins`` (collected), ``time_s``, ``fall`` and ``diverged``.
+        ``success`` (the finish was reached), ``score_percent`` (coins of the level's, 0 to 100;
+        without coins 100 for the finish), ``coins`` (collected), ``time_s``, ``fall`` and
+        ``diverged``.
         """
         every: Int64 | slice = slice(None) if rows is None else rows
-        coins = self.state.points[every]
+        coins, finished = self.state.points[every], self.state.finished[every]
         return {
-            "success": self.state.finished[every].copy(),
-            "score_percent": score_percent(coins, self.table.coin_count[every]),
+            "success": finished.copy(),
+            "score_percent": score_percent(coins, self.table.coin_count[every], finished),
             "coins": coins.copy(),
             "time_s": self.time_s[every],
             "fall": self.state.fallen[every].copy(),
@@ -381,7 +383,9 @@ class Simulation:
         """Step ``rows`` (None: all), whose state and level data are given; return the rewards."""
         every: Int64 | slice = slice(None) if rows is None else rows
         before = self._stepper.state[every].copy()
-        self._set_controls(every, rules.controls(state, table, force_n, self.duration_s))
+        placement = self._placement(every) if rules.anything_moves(state) else None
+        controls = rules.controls(state, table, force_n, placement, self.duration_s)
+        self._set_controls(every, controls)
         path = self._stepper.advance(rows)
         diverged = self._stepper.diverged()[every] | ~np.isfinite(path[:, -1]).all(axis=1)
         if diverged.any():
@@ -401,6 +405,18 @@ class Simulation:
         if self.config.reward == "shaped":
             reward += self._shaping(every, state, table, motion.ball[:, -1])
         return reward
+
+    def _placement(self, rows: Int64 | slice) -> Placement:
+        """Return where the ball and the slabs of ``rows`` are; copies, alike to the compiler."""
+        qpos, act, compiled = self._stepper.qpos[rows], self._stepper.act[rows], self.compiled
+        return Placement(
+            ball=self._position[rows].copy(),
+            velocity=self._velocity[rows].copy(),
+            plate=qpos[:, compiled.plate_qpos].copy(),
+            gate=qpos[:, compiled.gate_qpos].copy(),
+            plate_aim=act[:, compiled.plate_act].copy(),
+            gate_aim=act[:, compiled.gate_act].copy(),
+        )
 
     def _set_controls(self, rows: Int64 | slice, controls: rules.Controls) -> None:
         ctrl = np.empty((len(controls.force_n), self._stepper.ctrl.shape[1]))

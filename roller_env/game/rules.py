@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.game import cameras
+from roller_env.game import cameras, slabs
 from roller_env.game.compiled import compiled
 from roller_env.game.state import GameState
 from roller_env.game.sweep import Events, Motion
@@ -34,8 +34,8 @@ class Controls:
 
     Attributes:
         force_n: (N, 3) mean force on the ball over the step, world frame.
-        plate_velocity: (N, P) m/s, down is negative.
-        gate_velocity: (N, G) m/s.
+        plate_velocity: (N, P) m/s at which what pulls the plates moves, down is negative.
+        gate_velocity: (N, G) likewise of the gates.
     """
 
     force_n: Float64
@@ -43,18 +43,29 @@ class Controls:
     gate_velocity: Float64
 
 
+def anything_moves(state: GameState) -> bool:
+    """Say whether a plate or gate of any game has been set going."""
+    return bool(state.plate_struck.any() or state.gate_opening.any())
+
+
 def controls(
-    state: GameState, table: LevelTable, key_force_n: Float64, duration_s: float
+    state: GameState,
+    table: LevelTable,
+    key_force_n: Float64,
+    placement: slabs.Placement | None,
+    duration_s: float,
 ) -> Controls:
     """Return what the actuators do in the next step, given the keys' force (N, 2).
+
+    ``placement`` is needed only where `anything_moves`.
 
     Timers that end within the step act for their share of it, so that no impulse depends on the
     length of the control step.
     """
     result = Controls(
         force_n=np.empty((len(key_force_n), 3)),
-        plate_velocity=np.empty(state.plate_struck.shape),
-        gate_velocity=np.empty(state.gate_opening.shape),
+        plate_velocity=np.zeros(state.plate_struck.shape),
+        gate_velocity=np.zeros(state.gate_opening.shape),
     )
     _push(
         duration_s,
@@ -64,8 +75,36 @@ def controls(
         table.pad_force_n,
         result.force_n,
     )
-    _lower(state.plate_struck, table.plate_speed, result.plate_velocity)
-    _lower(state.gate_opening, table.gate_speed, result.gate_velocity)
+    if placement is None:
+        return result
+    slabs.lower(
+        duration_s,
+        state.plate_struck,
+        table.plate_speed,
+        table.centres(Kind.PLATE),
+        table.halves(Kind.PLATE),
+        table.plate_heading,
+        placement.plate,
+        placement.plate_aim,
+        placement.ball,
+        placement.velocity,
+        table.ball_radius,
+        result.plate_velocity,
+    )
+    slabs.lower(
+        duration_s,
+        state.gate_opening,
+        table.gate_speed,
+        table.gate_centre,
+        table.gate_half,
+        table.gate_heading,
+        placement.gate,
+        placement.gate_aim,
+        placement.ball,
+        placement.velocity,
+        table.ball_radius,
+        result.gate_velocity,
+    )
     return result
 
 
@@ -89,14 +128,6 @@ def _push(
         force_n[row, 2] = lift
 
 
-@compiled
-def _lower(moves: Bool, speed: Float64, velocity: Float64) -> None:
-    """Write the velocities of slabs, (n, slabs): down, where they move."""
-    for row in range(moves.shape[0]):
-        for slab in range(moves.shape[1]):
-            velocity[row, slab] = -speed[row, slab] if moves[row, slab] else 0.0
-
-
 def apply(state: GameState, table: LevelTable, motion: Motion, events: Events) -> None:
     """Change ``state`` by a step's events and by the passing of its time."""
     state.steps += 1
@@ -111,9 +142,11 @@ def apply(state: GameState, table: LevelTable, motion: Motion, events: Events) -
         state.plate_down,
         state.gate_opening,
     )
+    pads = table.slices[Kind.LIFT_PAD]
     _run_timers(
         motion.duration_s,
-        events.pads,
+        events.entry[:, pads],
+        table.pad_group,
         table.pad_duration_s,
         state.thrust_s,
         state.control_delay_s,
@@ -170,19 +203,38 @@ def _move_slabs(
 
 @compiled
 def _run_timers(
-    duration_s: float, entered: Bool, push_s: Float64, thrust_s: Float64, control_delay_s: Float64
+    duration_s: float,
+    entry: Float64,
+    group: Int64,
+    push_s: Float64,
+    thrust_s: Float64,
+    control_delay_s: Float64,
 ) -> None:
     """Let the timers of the intro and of pushing pads run, and start those of the pads entered.
 
-    A pad that is still pushing does not fire again, so that its push never lasts longer.
+    A pad that is still pushing does not fire again, so that its push never lasts longer; nor does
+    one of its group, so that a pad made of two pushes like one.
     """
     for row in range(thrust_s.shape[0]):
         control_delay_s[row] = max(control_delay_s[row] - duration_s, 0.0)
         for pad in range(thrust_s.shape[1]):
+            if entry[row, pad] < np.inf and _fires(pad, entry[row], group[row], thrust_s[row]):
+                thrust_s[row, pad] = -1.0  # until those behind it have been asked
+        for pad in range(thrust_s.shape[1]):
             left = thrust_s[row, pad]
-            if left <= 0.0 and entered[row, pad]:
+            if left < 0.0:
                 thrust_s[row, pad] = push_s[row, pad]
             else:
                 left -= duration_s
                 # Sums of control steps miss a timer's end by rounding: that is no time at all.
                 thrust_s[row, pad] = left if left >= 1e-9 else 0.0
+
+
+@compiled
+def _fires(pad: int, entry: Float64, group: Int64, thrust_s: Float64) -> bool:
+    """Say whether none of an entered pad's group is pushing or was entered before it."""
+    for other in range(len(group)):
+        first = entry[other] < entry[pad] or (entry[other] == entry[pad] and other < pad)
+        if group[other] == group[pad] and (thrust_s[other] > 0.0 or first):
+            return False
+    return True

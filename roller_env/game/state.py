@@ -113,6 +113,10 @@ class GameState:
             getattr(self, field.name)[rows] = values[field.name]
 
 
-def score_percent(points: Int64, coin_count: Int64) -> Float64:
-    """Return the percentage of the level's coins collected, (N,); 100 in a level without coins."""
-    return np.where(coin_count > 0, 100.0 * points / np.maximum(coin_count, 1), 100.0)
+def score_percent(points: Int64, coin_count: Int64, finished: Bool) -> Float64:
+    """Return the percentage of the level's coins collected, (N,).
+
+    A level without coins is all or nothing: 100 once it is finished, 0 before and after a fall.
+    """
+    collected = 100.0 * points / np.maximum(coin_count, 1)
+    return np.where(coin_count > 0, collected, np.where(finished, 100.0, 0.0))

@@ -7,6 +7,7 @@ region lies infinitely far away.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from enum import IntEnum
@@ -16,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.game.cameras import TriggerKind
-from roller_env.level.expand import coin_positions
+from roller_env.level.expand import coin_positions, pad_groups
 from roller_env.level.schema import PLATE_HIT_HEIGHT_M, Level
 from roller_env.units import quants
 
@@ -74,11 +75,15 @@ class LevelTable:
     plate_stop: Float64  # (L, P) displacement at which a plate is down, <= 0
     plate_speed: Float64  # (L, P)
     plate_opens: Bool  # (L, P, G)
+    plate_heading: Float64  # (L, P, 2) cosine and sine of its yaw, which is none
     gate_centre: Float64  # (L, G, 3)
+    gate_half: Float64  # (L, G, 3) half edges
+    gate_heading: Float64  # (L, G, 2) cosine and sine of its yaw
     gate_stop: Float64  # (L, G)
     gate_speed: Float64  # (L, G)
     pad_force_n: Float64  # (L, A)
     pad_duration_s: Float64  # (L, A)
+    pad_group: Int64  # (L, A) number of the first pad of those that push as one; own, if alone
     trigger_kind: Int64  # (L, T)
     route: Float64  # (L, W, 3)
     route_arc: Float64  # (L, W) metres along the route up to each waypoint
@@ -144,11 +149,15 @@ class LevelTable:
             plate_stop=pad(lambda level: [p.sinks_to - p.at[2] for p in level.plates]),
             plate_speed=pad(lambda level: [p.speed for p in level.plates]),
             plate_opens=pad(lambda level: _opens(level, gates), (gates,)) > 0.0,
+            plate_heading=pad(lambda level: [(1.0, 0.0) for _ in level.plates], (2,)),
             gate_centre=pad(lambda level: [g.at for g in level.gates], (3,)),
+            gate_half=pad(lambda level: [np.array(g.size) / 2 for g in level.gates], (3,)),
+            gate_heading=pad(lambda level: [_heading(g.yaw_deg) for g in level.gates], (2,)),
             gate_stop=pad(lambda level: [g.lowers_to - g.at[2] for g in level.gates]),
             gate_speed=pad(lambda level: [g.speed for g in level.gates]),
             pad_force_n=pad(lambda level: [p.force_n for p in level.lift_pads]),
             pad_duration_s=pad(lambda level: [p.duration_s for p in level.lift_pads]),
+            pad_group=pad(pad_groups).astype(np.int64),
             trigger_kind=pad(
                 lambda level: [TriggerKind[t.kind.upper()] for t in level.camera_triggers]
             ).astype(np.int64),
@@ -180,6 +189,10 @@ class LevelTable:
         """Return the centres, (L, n, 3), of the regions of ``kind``."""
         return self.region_centre[:, self.slices[kind]]
 
+    def halves(self, kind: Kind) -> Float64:
+        """Return the half edges, (L, n, 3), of the regions of ``kind``."""
+        return self.region_half[:, self.slices[kind]]
+
     def exists(self, kind: Kind) -> Bool:
         """Say which of the regions of ``kind``, (L, n), are not padding."""
         return self.region_real[:, self.slices[kind]]
@@ -204,6 +217,11 @@ def _regions(level: Level) -> dict[Kind, Float64]:
         Kind.FINISH: [row(level.finish.at, level.finish.size, touch)],
     }
     return {kind: np.array(values).reshape(-1, 8) for kind, values in rows.items()}
+
+
+def _heading(yaw_deg: float) -> tuple[float, float]:
+    yaw = math.radians(yaw_deg)
+    return math.cos(yaw), math.sin(yaw)
 
 
 def _opens(level: Level, gates: int) -> list[list[float]]:

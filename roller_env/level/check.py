@@ -15,8 +15,14 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.level.errors import FieldPath, Problem, listed, quoted
-from roller_env.level.expand import Float64, Solid, coin_positions, rotation_matrix, solids
+from roller_env.level.expand import (
+    TOUCHING_M,
+    Float64,
+    Solid,
+    coin_positions,
+    rotation_matrix,
+    solids,
+)
 from roller_env.level.schema import (
     BUILT_IN_MATERIALS,
     MAX_COINS,
@@ -28,12 +34,9 @@ from roller_env.level.schema import (
     Level,
     Plate,
 )
+from roller_env.problems import FieldPath, Problem, listed, quoted
 
 Unit = Literal["metre", "quant"]
-
-CONTACT_TOLERANCE_M: Final = 0.001
-"""How deep one thing may reach into another and still count as touching it: covers rounded numbers
-in files and the depth to which a resting ball sinks into MuJoCo's soft contacts."""
 
 MAX_JITTER_SAMPLES: Final = 65
 """Start positions tried along each axis of the jitter; corners and middle are always among them."""
@@ -213,8 +216,8 @@ def _heights(level: Level, in_unit: _InUnit) -> Iterator[Problem]:
 def _movers(level: Level, in_unit: _InUnit) -> Iterator[Problem]:
     for index, plate in enumerate(level.plates):
         struck_at = level.ball.radius + plate.size[2] / 2
-        if struck_at < PLATE_HIT_HEIGHT_M + CONTACT_TOLERANCE_M:
-            least = 2 * (PLATE_HIT_HEIGHT_M + CONTACT_TOLERANCE_M - level.ball.radius)
+        if struck_at < PLATE_HIT_HEIGHT_M + TOUCHING_M:
+            least = 2 * (PLATE_HIT_HEIGHT_M + TOUCHING_M - level.ball.radius)
             yield Problem(
                 ("plates", index, "size", 2),
                 f"a ball on the plate is {in_unit.length(struck_at)} over its centre, and only "
@@ -272,7 +275,7 @@ def _start(level: Level, everything: Sequence[Solid], in_unit: _InUnit) -> Itera
     ]
     xs, ys = np.meshgrid(*offsets, indexing="ij")
     positions = np.array(level.start.at) + np.stack([xs, ys, 0.0 * xs], axis=-1).reshape(-1, 3)
-    margin = max(radius - CONTACT_TOLERANCE_M, 0.0)
+    margin = max(radius - TOUCHING_M, 0.0)
     hit = dict.fromkeys(solid.source for solid, _ in _inside(everything, positions, margin))
     if hit:
         where = " somewhere within its jitter" if any(jitter) else ""
@@ -314,7 +317,7 @@ def _coin_groups(
 
 
 def _shrunk(half_size: tuple[float, float, float]) -> tuple[float, float, float]:
-    x, y, z = (max(half - CONTACT_TOLERANCE_M, 0.0) for half in half_size)
+    x, y, z = (max(half - TOUCHING_M, 0.0) for half in half_size)
     return x, y, z
 
 
@@ -331,7 +334,7 @@ def _inside(
     centres = np.array([solid.centre for solid in blocks])
     rotations = np.array([solid.rotation for solid in blocks])
     halves = np.array([solid.half_size for solid in blocks])
-    reach = np.einsum("nij,nj->ni", np.abs(rotations), halves) + margin + CONTACT_TOLERANCE_M
+    reach = np.einsum("nij,nj->ni", np.abs(rotations), halves) + margin + TOUCHING_M
     orders = [np.argsort(points[:, axis]) for axis in range(3)]
     spans = np.empty((3, 2, len(blocks)), dtype=np.intp)
     for axis, order in enumerate(orders):

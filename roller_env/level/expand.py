@@ -21,6 +21,10 @@ Float64 = npt.NDArray[np.float64]
 COIN_HEIGHT_M = quants(16.0)
 """Height of a floor plan's coin over its cell: the middle of the original's ball."""
 
+TOUCHING_M = 0.001
+"""Things that are this near to each other touch, and one may reach this deep into another: covers
+rounded numbers in files and the depth to which a resting ball sinks into MuJoCo's soft contacts."""
+
 _IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 Matrix = tuple[tuple[float, float, float], ...]
 
@@ -182,6 +186,34 @@ def _tube_solids(tube: Tube, source: str) -> Iterator[Solid]:
             tube.material,
             source,
         )
+
+
+def pad_groups(level: Level) -> list[int]:
+    """Return, for each lift pad, the number of the first pad of those that push as one with it.
+
+    Pads that overlap or touch, if only by way of others between them, are one pad to the ball.
+    """
+    pads = level.lift_pads
+    middle = np.array([pad.at for pad in pads]).reshape(-1, 3)
+    half = np.array([pad.size for pad in pads]).reshape(-1, 3) / 2
+    low, high = middle - half, middle + half + TOUCHING_M
+    first = list(range(len(pads)))
+    in_x = np.argsort(low[:, 0], kind="stable")
+    for place, number in enumerate(in_x.tolist()):
+        beside = in_x[place + 1 : np.searchsorted(low[in_x, 0], high[number, 0], "right")]
+        near = (low[beside] <= high[number]) & (low[number] <= high[beside])
+        for other in beside[near.all(axis=1)].tolist():
+            one, two = sorted((_root(first, number), _root(first, other)))
+            first[two] = one
+    return [_root(first, number) for number in range(len(pads))]
+
+
+def _root(first: list[int], number: int) -> int:
+    """Follow ``first`` to a number that is its own, and shorten the way for the next time."""
+    while first[number] != number:
+        first[number] = first[first[number]]
+        number = first[number]
+    return number
 
 
 def coin_positions(level: Level) -> tuple[Float64, tuple[str, ...]]:

@@ -9,7 +9,7 @@ not be read would make every plate that names it look wrong.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -19,10 +19,12 @@ from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema
 
 from roller_env.level.check import Unit, check_level
-from roller_env.level.errors import LevelError, Problem, listed, quoted
+from roller_env.level.errors import LevelError
 from roller_env.level.messages import explain
 from roller_env.level.schema import METRES_PER_UNIT, SCALE_KEY, Level
-from roller_env.level.yaml_tree import MAX_BYTES, Node, plain_tree, read_tree
+from roller_env.problems import Problem, listed, quoted
+from roller_env.regular_files import read_regular_file
+from roller_env.yaml_tree import MAX_BYTES, Node, YamlError, plain_tree, read_tree
 
 SUFFIXES: Final = (".yaml", ".yml")
 
@@ -48,7 +50,7 @@ def load_level(source: str | os.PathLike[str] | Level | Mapping[str, Any]) -> Le
         return source
     if isinstance(source, Mapping):
         try:
-            return _level(plain_tree(source), "", "")
+            return _level(_tree(lambda: plain_tree(source)), "", "")
         except LevelError as error:
             raise LevelError(map(_without_a_place, error.problems)) from None
     is_name = isinstance(source, str) and not is_path(source)
@@ -75,7 +77,15 @@ def parse_level(text: str, filename: str = "<text>") -> Level:
     Raises:
         LevelError: the level has problems; all of them are in ``problems``.
     """
-    return _level(read_tree(text, filename), text, filename)
+    return _level(_tree(lambda: read_tree(text, filename)), text, filename)
+
+
+def _tree(read: Callable[[], Node]) -> Node:
+    """Return what ``read`` reads; what is wrong with its YAML is wrong with a level."""
+    try:
+        return read()
+    except YamlError as error:
+        raise LevelError(error.problems) from None
 
 
 def _level(root: Node, text: str, filename: str) -> Level:
@@ -153,22 +163,16 @@ def _shipped_path(name: str) -> Path:
 
 def _read(path: Path) -> bytes:
     try:
-        with path.open("rb") as file:
-            return file.read(MAX_BYTES + 1)
+        return read_regular_file(path, MAX_BYTES)
     except FileNotFoundError:
         levels = [other.name for suffix in SUFFIXES for other in path.parent.glob(f"*{suffix}")]
         problem = Problem((), "there is no such file", written=path.name, known=tuple(levels))
     except OSError as error:
-        problem = Problem((), f"the file cannot be read: {error.strerror}")
-    except ValueError as error:  # a NUL character in the path
-        problem = Problem((), f"the file cannot be read: {error}")
+        problem = Problem((), f"it cannot be read: {error.strerror}")
     raise LevelError([replace(problem, filename=str(path))])
 
 
 def _parse_bytes(data: bytes, filename: str) -> Level:
-    if len(data) > MAX_BYTES:
-        message = f"the file is too large; allowed are at most {MAX_BYTES} bytes"
-        raise LevelError([Problem((), message, filename)])
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -14,9 +14,9 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 from pydantic_core.core_schema import ErrorType
 
-from roller_env.level.errors import FieldPath, Problem, listed, quoted
 from roller_env.level.schema import COLOUR_PATTERN, NAME_PATTERN, Level
-from roller_env.level.yaml_tree import Node
+from roller_env.problems import FieldPath, Problem, listed, quoted
+from roller_env.yaml_tree import Node
 
 _PATTERNS: Final = {
     NAME_PATTERN: "a letter, then letters, digits, '_' or '-', at most 64 in all",
@@ -111,8 +111,7 @@ def _plan_place(root: Node, path: FieldPath, text: str, found: dict[str, Any]) -
     if plan is None or not plan.is_block:
         return line, column
     lines = text.splitlines()
-    rows = [index for index in range(line, len(lines)) if lines[index].strip()]
-    row = rows[found["number"] - 1]
+    row = line + found["number"] - 1
     indent = len(lines[row]) - len(lines[row].lstrip())
     strange = lines[row].find(found.get("character", "''")[1:-1], indent)
     return row + 1, max(strange, indent) + 1

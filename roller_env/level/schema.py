@@ -222,7 +222,8 @@ class FloorPlan(Piece):
     cell: PositiveLength = Field(description="Edge length of one character's square.")
     thickness: PositiveLength = Field(quants(16.0), description="Downwards from the upper face.")
     plan: Annotated[str, Field(max_length=MAX_PLAN_CELLS)] = Field(
-        description="The drawing: a block of text ('plan: |'), all rows equally long."
+        description="The drawing: a block of text ('plan: |'), all rows equally long; a blank one "
+        "is empty."
     )
     legend: dict[str, FloorCell] = Field(
         default_factory=dict, description="More characters, or other meanings of # and o."
@@ -250,7 +251,7 @@ class FloorPlan(Piece):
             if len(row) != len(rows[0]):
                 raise PydanticCustomError(
                     "ragged_plan",
-                    "row {number} of the plan has {found} characters, the first has {wanted}; "
+                    "row {number} of the plan has {found} characters, others have {wanted}; "
                     "draw empty cells as '.'",
                     {"number": number, "found": len(row), "wanted": len(rows[0])},
                 )
@@ -270,8 +271,10 @@ class FloorPlan(Piece):
 
     @property
     def rows(self) -> list[str]:
-        """The plan's rows, from the largest x to the smallest."""
-        return [line.rstrip() for line in self.plan.splitlines() if line.strip()]
+        """The plan's rows, from the largest x to the smallest; a blank line is an empty row."""
+        lines = [line.rstrip() for line in self.plan.splitlines()]
+        empty = "." * len(next(filter(None, lines), ""))
+        return [line or empty for line in lines] if empty else []
 
     @cached_property
     def cells(self) -> dict[str, FloorCell]:

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 from roller_env.physics.presets import PhysicsPreset
 
@@ -76,6 +77,7 @@ def restitution(zeta: float) -> float:
     return math.exp(-2.0 * beta / math.tanh(beta))
 
 
+@lru_cache(maxsize=256)
 def damping_ratio(elasticity: float) -> float:
     """Return the damping ratio whose restitution is ``elasticity``; in (0, 1].
 

@@ -30,6 +30,7 @@ class Stepper:
     Attributes:
         qpos: (N, nq) float64, live view of the positions.
         qvel: (N, nv) float64, live view of the velocities.
+        act: (N, na) float64, live view of the actuators' activations.
         ctrl: (N, nu) float64, live view of the controls; they hold during `advance`.
         state: (N, nstate) float64, live view of MuJoCo's integration state: all of the above,
             activations, time and the solver's warm start. Copying a row back restores it exactly.
@@ -50,6 +51,8 @@ class Stepper:
         self._batch = Batch(model, num_envs, num_threads, persistent=keeps_poses(model))
         self.qpos: Float64 = self._batch.bind("qpos")
         self.qvel: Float64 = self._batch.bind("qvel")
+        # MuJoCo cannot bind what a model has none of.
+        self.act: Float64 = self._batch.bind("act") if model.na else np.empty((num_envs, 0))
         self.ctrl: Float64 = self._batch.bind("ctrl")
         self.state: Float64 = self._batch.state
         self._recorded = np.empty((num_envs, substeps, model.nq))

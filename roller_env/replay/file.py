@@ -26,6 +26,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import from_json
 
 from roller_env.level import Level, LevelError, levels_directory, load_level
+from roller_env.regular_files import read_regular_file
 from roller_env.replay.contents import (
     FORMAT_VERSION,
     MAX_STEPS,
@@ -103,12 +104,7 @@ def load_replay(file: str | os.PathLike[str]) -> Replay:
     """
     path = Path(file)
     try:
-        # A pipe or a device would never end; asking for one byte more shows a file too large.
-        if not path.is_file():
-            raise ReplayError("there is no such file" if not path.exists() else "not a file")
-        with path.open("rb") as stream:
-            content = stream.read(_MAX_BYTES + 1)
-        return decode(content)
+        return decode(read_regular_file(path, _MAX_BYTES))
     except OSError as error:
         raise ReplayError(f"{path}: {error.strerror}") from None
     except ReplayError as error:

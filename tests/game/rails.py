@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from roller_env.game import rules, sweep
+from roller_env.game.slabs import Placement
 from roller_env.game.state import GameState
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level
@@ -29,16 +30,26 @@ class Rails:
         self.step_s = step_s
         self.time_s = 0.0
         self.plate = np.zeros(self.table.plate_stop.shape)
+        self.gate = np.zeros(self.table.gate_stop.shape)
         self._ball = self.table.start.copy()
+
+    @property
+    def placement(self) -> Placement:
+        """Where the balls and slabs are; on rails the slabs trail nothing."""
+        still = np.zeros_like(self._ball)
+        return Placement(self._ball, still, self.plate, self.gate, self.plate, self.gate)
 
     def follow(self, path: Float64, velocity: Float64 | None = None) -> sweep.Events:
         """Let one control step pass on a path, (N, S + 1, 3) metres; struck plates sink."""
         if velocity is None:
             velocity = (path[:, -1] - path[:, -2]) * (path.shape[1] - 1) / self.step_s
         keys = np.zeros((len(path), 2))
-        controls = rules.controls(self.state, self.table, keys, self.step_s)
+        controls = rules.controls(self.state, self.table, keys, self.placement, self.step_s)
         self.plate = np.maximum(
             self.plate + controls.plate_velocity * self.step_s, self.table.plate_stop
+        )
+        self.gate = np.maximum(
+            self.gate + controls.gate_velocity * self.step_s, self.table.gate_stop
         )
         motion = sweep.Motion(path, self.plate, velocity, self.step_s)
         events = sweep.find_events(self.state, self.table, motion)

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from roller_env.game.rules import INTRO_S
-from roller_env.game.state import score_percent
 from roller_env.level import Level
 from roller_env.level.schema import Ball, Gate, LiftPad, Plate
 from tests.builders import BALL_RADIUS_M, GRAVITY, Game, coin, make_level, q, resting
@@ -331,13 +330,35 @@ def test_two_pads_have_timers_of_their_own_and_their_forces_add() -> None:
     np.testing.assert_allclose(rails.state.thrust_s, [[5.0 - 1.05, 5.0]])
 
 
-def test_two_pads_under_the_ball_push_with_both_forces() -> None:
-    half = {"size": q(36, 72, 4)}
-    pads = [PAD | half | {"at": q(-18, 0, 2)}, PAD | half | {"at": q(18, 0, 2)}]
-    game = Game(lift_level(lift_pads=pads))
+HALF = {"size": q(36, 72, 4)}
+LEFT, RIGHT = PAD | HALF | {"at": q(-18, 0, 2)}, PAD | HALF | {"at": q(18, 0, 2)}
+
+
+def test_two_pads_under_the_ball_that_do_not_touch_push_with_both_forces() -> None:
+    apart = [LEFT | {"at": q(-18.1, 0, 2)}, RIGHT | {"at": q(18.1, 0, 2)}]
+    game = Game(lift_level(lift_pads=apart))
     game.play(1.05)
     net = 2 * 12.7 - GRAVITY
     assert game.observed("velocity")[2] == pytest.approx(net, rel=0.01)
+
+
+@pytest.mark.parametrize("overlap", [0.0, 5.0, 36.0])
+def test_a_pad_split_in_two_throws_the_ball_as_high_as_a_whole_one(overlap: float) -> None:
+    game = Game(lift_level(lift_pads=[LEFT, RIGHT | {"at": q(18 - overlap, 0, 2)}]))
+    assert game.play(8.0)[:, 2].max() - BALL_RADIUS_M == pytest.approx(46.9, rel=0.02)
+
+
+def test_pads_that_touch_have_one_timer_and_the_first_one_entered_pushes() -> None:
+    strong = RIGHT | {"force_n": 40.0, "duration_s": 2.0}
+    rails = Rails(lift_level(lift_pads=[LEFT, strong], start={"at": q(100, 0, 20)}))
+    rails.go(q(-18, 0, 20))
+    np.testing.assert_array_equal(rails.state.thrust_s, [[0.0, 2.0]])
+    rails.go(q(-18, 0, 200), q(-18, 0, 20))
+    np.testing.assert_allclose(rails.state.thrust_s, [[0.0, 1.95]])
+    rails.go(q(-18, 0, 200))
+    rails.wait(2.0)
+    rails.go(q(-18, 0, 20))
+    np.testing.assert_array_equal(rails.state.thrust_s, [[5.0, 0.0]])
 
 
 def test_a_pad_is_solid() -> None:
@@ -397,12 +418,20 @@ def test_the_score_is_the_percentage_of_the_coins(taken: int, percent: float) ->
     assert results["coins"][0] == taken
 
 
-def test_a_level_without_coins_scores_100() -> None:
+def test_a_level_without_coins_scores_100_at_the_finish_and_nothing_before() -> None:
     game = Game(finish_level())
     with np.errstate(all="raise"):
+        assert game.simulation.results(np.array([0]))["score_percent"][0] == 0.0
         game.play(3.0, "w")
         assert game.simulation.results(np.array([0]))["score_percent"][0] == 100.0
-    np.testing.assert_array_equal(score_percent(np.array([0]), np.array([0])), [100.0])
+
+
+def test_a_fall_on_a_level_without_coins_scores_nothing() -> None:
+    game = Game(make_level(boxes=[{"at": (0.0, 0.0, -0.5), "size": (1.0, 1.0, 1.0)}]))
+    game.play(5.0, "w")
+    results = game.simulation.results(np.array([0]))
+    assert results["fall"][0]
+    assert results["score_percent"][0] == 0.0
 
 
 # Fall and reset -----------------------------------------------------------------------------------

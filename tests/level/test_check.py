@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from roller_env.level import check_level, parse_level
-from roller_env.level.check import CONTACT_TOLERANCE_M
-from roller_env.level.errors import FieldPath
+from roller_env.level.expand import TOUCHING_M
 from roller_env.level.schema import BUILT_IN_MATERIALS, MAX_COINS, MAX_PIECES, PLATE_HIT_HEIGHT_M
+from roller_env.problems import FieldPath
 from roller_env.units import quants
 from tests.level.samples import COMPLETE, small_level
 
@@ -102,11 +102,11 @@ def test_every_kind_of_static_piece_needs_a_known_material() -> None:
 
 def test_a_ball_resting_on_the_floor_is_not_inside_it() -> None:
     assert faults(start=start_at(0, 0, RADIUS)) == []
-    assert faults(start=start_at(0, 0, RADIUS - 0.9 * CONTACT_TOLERANCE_M)) == []
+    assert faults(start=start_at(0, 0, RADIUS - 0.9 * TOUCHING_M)) == []
 
 
 def test_a_ball_that_starts_in_the_floor_is_a_fault() -> None:
-    sunk = start_at(0, 0, RADIUS - 1.1 * CONTACT_TOLERANCE_M)
+    sunk = start_at(0, 0, RADIUS - 1.1 * TOUCHING_M)
     assert faults(start=sunk) == [("start", "at")]
     assert "would start inside boxes[0];" in message(start=sunk)
 
@@ -208,7 +208,7 @@ def test_coins_lie_above_the_kill_height() -> None:
 
 def test_a_coin_on_a_surface_is_not_inside_it() -> None:
     assert faults(coins=[{"at": (1, 0, 0)}]) == []
-    assert faults(coins=[{"at": (1, 0, -2 * CONTACT_TOLERANCE_M)}]) == [("coins", 0)]
+    assert faults(coins=[{"at": (1, 0, -2 * TOUCHING_M)}]) == [("coins", 0)]
 
 
 @pytest.mark.parametrize("kind", ["plate", "gate", "pad"])
@@ -294,7 +294,7 @@ def _in_any(coin: Any, places: Any, turns: Any) -> bool:
             along * np.cos(pitch) - dz * np.sin(pitch),
             dz * np.cos(pitch) + along * np.sin(pitch),
         )
-        deep = np.array([1.0, 0.25, 0.5]) - CONTACT_TOLERANCE_M
+        deep = np.array([1.0, 0.25, 0.5]) - TOUCHING_M
         if np.all(np.abs([x, left, z]) <= deep):
             return True
     return False

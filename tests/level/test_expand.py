@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from roller_env.level.expand import COIN_HEIGHT_M, Solid, coin_positions, solids
+from roller_env.level.expand import COIN_HEIGHT_M, Solid, coin_positions, pad_groups, solids
+from roller_env.yaml_tree import read_tree
 from tests.level.samples import small_level
 
 
@@ -29,6 +30,37 @@ def test_up_the_page_is_forward_and_left_is_left() -> None:
     positions, sources = coin_positions(small_level(boxes=[], floors=[plan]))
     assert positions.tolist() == [[11.0, 21.0, 3.0 + COIN_HEIGHT_M]]
     assert sources == ("floors[0]",)
+
+
+def test_a_blank_row_of_a_floor_is_an_empty_row_and_shifts_nothing() -> None:
+    blank = {"corner": (0.0, 0.0, 0.0), "cell": 2.0, "plan": "\n#o\n\n  \n##\n"}
+    drawn = blank | {"plan": "..\n#o\n..\n..\n##"}
+    blocks = expanded(floors=[blank])
+    assert blocks == expanded(floors=[drawn])
+    assert sorted({block.centre[0] for block in blocks}) == [1.0, 7.0]
+
+
+@pytest.mark.parametrize(("ending", "lowest"), [("|", 1.0), ("|-", 1.0), ("|+", 3.0)])
+def test_a_blank_line_under_a_plan_belongs_to_it_if_yaml_says_so(
+    ending: str, lowest: float
+) -> None:
+    text = f"a:\n  corner: [0, 0, 0]\n  cell: 2\n  plan: {ending}\n    #\n    #\n\nb: 1\n"
+    plan = read_tree(text, "f").find(("a",)).plain()  # type: ignore[union-attr]
+    assert min(block.centre[0] for block in expanded(floors=[plan])) == lowest
+
+
+def groups(*pads: tuple[float, float, float]) -> list[int]:
+    """Return the groups of pads of one metre in length and width, 0.2 m high, by their centres."""
+    return pad_groups(small_level(lift_pads=[{"at": at, "size": (1.0, 1.0, 0.2)} for at in pads]))
+
+
+def test_pads_that_overlap_or_touch_are_one_group_also_by_way_of_others() -> None:
+    assert groups((0, 0, 0), (1, 0, 0), (5, 0, 0)) == [0, 0, 2]
+    assert groups((0, 0, 0), (2, 0, 0), (1, 0.5, 0.1)) == [0, 0, 0]
+    assert groups((4, 0, 0), (0, 0, 0), (3, 0, 0), (1, 0, 0), (2, 0, 0)) == [0] * 5
+    assert groups((0, 0, 0), (1, 1, 0)) == [0, 0], "at a corner"
+    assert groups((0, 0, 0), (1.002, 0, 0)) == groups((0, 0, 0), (0, 0, 0.21)) == [0, 1]
+    assert groups() == []
 
 
 def test_a_block_of_a_floor_stands_on_its_cell_and_carries_its_coin() -> None:

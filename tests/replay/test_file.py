@@ -263,7 +263,12 @@ def test_nothing_is_unpickled(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("nothing", "no such file"), (".", "not a file"), ("pipe", "not a file"), ("a\0b", "no such")],
+    [
+        ("nothing", "no such file"),
+        (".", "found a directory"),
+        ("pipe", "found a pipe"),
+        ("a\0b", "no such"),
+    ],
 )
 def test_what_is_no_file_is_said_to_be_none(tmp_path: Path, name: str, message: str) -> None:
     os.mkfifo(tmp_path / "pipe")
@@ -276,7 +281,9 @@ def test_a_file_too_large_is_not_read_whole(
 ) -> None:
     file = save_replay(PLAYED, tmp_path / "game.replay")
     monkeypatch.setattr(replay_file, "_MAX_BYTES", len(CONTENT) - 1)
-    with pytest.raises(ReplayError, match=r"game\.replay: too large; allowed are at most"):
+    with pytest.raises(
+        ReplayError, match=r"game\.replay: the file is too large; allowed are at most"
+    ):
         load_replay(file)
 
 

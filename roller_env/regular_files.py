@@ -1,0 +1,58 @@
+"""Read a file of a stranger: a regular one, of bounded size, or nothing at all.
+
+A pipe or a terminal would be waited for without end, and a device may be endless; so neither is
+opened to be read.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+from typing import Final
+
+_KINDS: Final = {
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFDIR: "a directory",
+}
+
+
+def read_regular_file(path: Path, most_bytes: int) -> bytes:
+    """Return the content of a regular file, at once.
+
+    Args:
+        path: the file; symbolic links are followed.
+        most_bytes: the most that the file may hold.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        OSError: it is a pipe, a socket, a device or a directory, it is too large, or it cannot be
+            read; ``strerror`` says which, in words.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, ValueError):  # the latter for a NUL character in the name
+        raise FileNotFoundError(errno.ENOENT, "there is no such file") from None
+    _check_kind(mode)
+    # Without blocking, for what has become a pipe since; so it is asked again.
+    with open(path, "rb", opener=_open_at_once) as file:
+        _check_kind(os.fstat(file.fileno()).st_mode)
+        content = file.read(most_bytes + 1)
+    if len(content) > most_bytes:
+        message = f"the file is too large; allowed are at most {most_bytes} bytes"
+        raise OSError(errno.EFBIG, message)
+    return content
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY)
+
+
+def _check_kind(mode: int) -> None:
+    if not stat.S_ISREG(mode):
+        kind = _KINDS.get(stat.S_IFMT(mode), "something else")
+        raise OSError(errno.EINVAL, f"found {kind}; wanted a regular file")
