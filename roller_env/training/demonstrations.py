@@ -22,7 +22,7 @@ from roller_env.replay.experience import Experience, actions_of, experiences
 from roller_env.replay.file import SUFFIX
 from roller_env.replay.scripted import PLAYER, meant
 from roller_env.training.config import TrainingConfig
-from roller_env.training.policy import Observations
+from roller_env.training.normalisation import Observations
 
 
 class DemonstrationError(ValueError):

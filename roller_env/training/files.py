@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from roller_env.level.errors import shown
+
 
 class RunError(RuntimeError):
     """A run directory that cannot be used as asked; the message says what would be right."""
@@ -36,11 +38,21 @@ class RunFiles:
 
     @property
     def policy(self) -> Path:
-        """The trained agent, as Stable-Baselines3 saves it."""
+        """What the trained agent is; see `roller_env.training.policy`."""
+        return self.directory / "policy.json"
+
+    @property
+    def weights(self) -> Path:
+        """The trained agent's weights."""
+        return self.directory / "policy.safetensors"
+
+    @property
+    def sb3_policy(self) -> Path:
+        """The trained agent as Stable-Baselines3 saves it, for use there."""
         return self.directory / "policy.zip"
 
     @property
-    def normaliser(self) -> Path:
+    def sb3_normaliser(self) -> Path:
         """Statistics of the observations, as Stable-Baselines3's VecNormalize saves them."""
         return self.directory / "vecnormalize.pkl"
 
@@ -88,6 +100,24 @@ class RunFiles:
     def summary(self) -> Path:
         """What ran, on what, for how long; written last: a run that has it is finished."""
         return self.directory / "run.json"
+
+
+def read_whole(file: Path, max_bytes: int) -> bytes:
+    """Return a file's content; what is no plain file is not opened, since a pipe never ends.
+
+    Raises:
+        RunError: there is no such file, or it cannot be read, or is larger than allowed.
+    """
+    if not file.is_file():
+        raise RunError(f"{shown(file)}: {'not a file' if file.exists() else 'there is none'}")
+    try:
+        with file.open("rb") as stream:
+            content = stream.read(max_bytes + 1)
+    except OSError as error:
+        raise RunError(f"{shown(file)}: {error.strerror}") from None
+    if len(content) > max_bytes:
+        raise RunError(f"{shown(file)}: too large; allowed are at most {max_bytes} bytes")
+    return content
 
 
 def write_atomically(file: Path, content: bytes | str) -> None:

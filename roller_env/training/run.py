@@ -76,7 +76,7 @@ def train(config: TrainingConfig, directory: Path, *, resume: bool = False) -> T
         if demonstrations is not None:
             print(start_from_demonstrations(config, demonstrations, files), flush=True)
         model, progress = learn(config, files)
-        save_policy(model, files)
+        save_policy(model, config, files)
         start_s = time.monotonic()
         policy = load_policy(directory)
         evaluation = evaluate_policy(policy, config, config.evaluation_episodes)

@@ -22,7 +22,7 @@ from roller_env.training.checkpoint import (
     save_checkpoint,
 )
 from roller_env.training.files import RunError, RunFiles, only_one_process, write_atomically
-from roller_env.training.ppo import learn, make_environments
+from roller_env.training.ppo import learn, make_environments, new_model
 from roller_env.training.practice import PracticeStarts
 from tests.training.small import UPDATES, small_config
 
@@ -36,7 +36,10 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[PPO, Checkpoint, 
 
 
 def restored(checkpoint: Checkpoint) -> PPO:
-    return checkpoint.restore(make_environments(checkpoint.config.model_copy(update={"seed": 9})))
+    config = checkpoint.config.model_copy(update={"seed": 9})
+    model = new_model(config, make_environments(config))
+    checkpoint.restore(model)
+    return model
 
 
 def normaliser(model: PPO) -> VecNormalize:

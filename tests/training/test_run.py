@@ -127,9 +127,7 @@ def test_a_little_training_on_the_flat_level_finds_the_way_and_leaves_every_file
     run = train(config, tmp_path / "run")
     trained = evaluate_policy(load_policy(run.files.directory), config, 20)
     untrained_model = new_model(config, make_environments(config))
-    normaliser = untrained_model.get_vec_normalize_env()
-    assert normaliser is not None
-    untrained = evaluate_policy(TrainedPolicy(untrained_model, normaliser, config), config, 20)
+    untrained = evaluate_policy(TrainedPolicy.of(untrained_model, config), config, 20)
     assert trained.table()["success rate"].mean >= 0.9
     assert untrained.table()["success rate"].mean <= 0.5
 
@@ -185,5 +183,5 @@ def test_every_kind_of_observation_and_action_can_be_trained(
 
 
 def test_a_run_without_a_policy_says_how_to_get_one(tmp_path: Path) -> None:
-    with pytest.raises(RunError, match=r"has no config\.yaml; .*--resume"):
+    with pytest.raises(RunError, match=r"has no policy\.json; .*--resume"):
         load_policy(tmp_path)
