@@ -68,6 +68,10 @@ class Arguments:
     policy: Path | None = None
     """A run's directory: its agent plays until you press a key."""
 
+    trust: bool = False
+    """Also play an agent that is kept as pickles, as Stable-Baselines3 saves it. A pickle runs any
+    program its maker put into it: only for runs of people you trust."""
+
     replays: Path | None = None
     """Directory for a replay of every game; scripts/replay.py verifies, shows and films them."""
 
@@ -122,7 +126,9 @@ def game_of(arguments: Arguments) -> tuple[EnvConfig, Player | None]:
     # Imported here: it takes torch, which a person's game does not need.
     from roller_env.play.autopilot import load_autopilot
 
-    return load_autopilot(arguments.policy, arguments.level, arguments.physics)
+    return load_autopilot(
+        arguments.policy, arguments.level, arguments.physics, trust=arguments.trust
+    )
 
 
 def session_maker(

@@ -17,7 +17,7 @@ import json
 import random
 import zipfile
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -33,6 +33,7 @@ from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 
 from roller_env.envs.sb3 import VecSnapshot
+from roller_env.game.cameras import MODES
 from roller_env.level.errors import shown
 from roller_env.simulation import Snapshot
 from roller_env.training.config import TrainingConfig
@@ -51,6 +52,9 @@ _HEADER: Final = b"roller-checkpoint-2 sha256 "
 _HEADER_LENGTH: Final = len(_HEADER) + hashlib.sha256().digest_size * 2 + 1
 _STATE, _ARRAYS = "state.json", "arrays.safetensors"
 _BETWEEN_NAMES: Final = "/"
+_VARYING: Final = ("physics", "game", "level_of_row", "generators")
+"""Of a `Snapshot`; its other fields are what the configuration says."""
+
 _REMEDY: Final = "remove the run's directory to train again from the start"
 
 
@@ -294,23 +298,35 @@ def _practice(tree: Tree, own: PracticeSnapshot) -> PracticeSnapshot:
 
 
 def _of_snapshot(snapshot: Snapshot) -> Tree:
-    names = [field.name for field in fields(Snapshot) if field.name != "level"]
-    return {name: getattr(snapshot, name) for name in names}
+    return {name: getattr(snapshot, name) for name in _VARYING}
 
 
 def _snapshot(tree: Tree, own: Snapshot, rows: int) -> Snapshot:
-    """Return the snapshot of so many rows that a tree is, of the kind that ``own`` is."""
-    found, wanted = _flat(tree), _flat(_of_snapshot(own))
+    """Return the snapshot of so many rows that a tree is, of the environments that ``own`` is of.
+
+    Raises:
+        ValueError: arrays are missing or of another shape, or numbers point at what is not there.
+    """
+    wanted = _flat(_of_snapshot(own))
     like = {
         name: np.empty((rows, *value.shape[1:]), value.dtype)
         for name, value in wanted.items()
         if isinstance(value, np.ndarray)
     }
-    _check_arrays(found, {**wanted, **like})
+    _check_arrays(_flat(tree), {**wanted, **like})
+    route = own.level.route
+    # The compiled rules look these up without asking whether they are there.
+    for name, numbers, count in (
+        ("level_of_row", tree["level_of_row"], 1),
+        ("camera_mode", tree["game"]["camera_mode"], len(MODES)),
+        ("waypoint", tree["game"]["waypoint"], 1 if route is None else len(route.points)),
+    ):
+        if ((numbers < 0) | (numbers >= count)).any():
+            raise ValueError(f"{name}: found {numbers.tolist()}; must be 0 to {count - 1}")
     generators = tuple(tree["generators"])
     if len(generators) != rows:
         raise ValueError(f"generators: found {len(generators)}; wanted {rows}")
-    return Snapshot(level=own.level, **{**tree, "generators": generators})
+    return replace(own, **{**tree, "generators": generators})
 
 
 def _random_state() -> Tree:

@@ -5,11 +5,15 @@ from __future__ import annotations
 import fcntl
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
-from roller_env.level.errors import shown
+from roller_env.level.errors import quoted, shown
+
+MAX_NAME_BYTES: Final = 150
+"""Of a run's name; the agent's replays carry it with them."""
 
 
 class RunError(RuntimeError):
@@ -101,6 +105,14 @@ class RunFiles:
         """What ran, on what, for how long; written last: a run that has it is finished."""
         return self.directory / "run.json"
 
+    @property
+    def has_begun(self) -> bool:
+        """Whether there is something of a training that another could destroy."""
+        kept = (self.checkpoint, self.policy, self.sb3_policy, self.summary)
+        return any(file.exists() for file in kept) or (
+            self.progress.exists() and self.progress.stat().st_size > 0
+        )
+
 
 def read_whole(file: Path, max_bytes: int) -> bytes:
     """Return a file's content; what is no plain file is not opened, since a pipe never ends.
@@ -130,17 +142,42 @@ def write_atomically(file: Path, content: bytes | str) -> None:
     """
     data = content.encode() if isinstance(content, str) else content
     temporary = file.with_name(file.name + ".tmp")
-    with temporary.open("wb") as stream:
-        stream.write(data)
-        stream.flush()
-        os.fsync(stream.fileno())
-    temporary.replace(file)
-    # The new name is in the directory, which reaches the disk in its own time unless told.
-    descriptor = os.open(file.parent, os.O_RDONLY)
     try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        with temporary.open("wb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(file)
+        # The new name is in the directory, which reaches the disk in its own time unless told.
+        descriptor = os.open(file.parent, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        # A write that fails does not say itself in which file.
+        raise OSError(error.errno, error.strerror, str(file)) from error
+
+
+def run_directory(runs: Path, name: str) -> Path:
+    """Return the directory of a run.
+
+    Args:
+        runs: directory of all runs.
+        name: the run's; one name, not a way to somewhere else.
+
+    Raises:
+        RunError: no file can be called that, or it would be outside ``runs``.
+    """
+    is_one_name = Path(name).name == name and not name.startswith(".")
+    if not (is_one_name and name.isprintable() and len(os.fsencode(name)) <= MAX_NAME_BYTES):
+        raise RunError(
+            f"name: found {quoted(name)}; must be a name for a directory inside {shown(runs)}: "
+            f"at most {MAX_NAME_BYTES} bytes that can be printed, no '/', no '.' at the beginning"
+        )
+    return runs / name
 
 
 @contextmanager
@@ -155,6 +192,8 @@ def only_one_process(directory: Path) -> Iterator[None]:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
-            message = f"{directory} is being trained by another process; choose another --name"
+            message = (
+                f"{shown(directory)} is being trained by another process; choose another --name"
+            )
             raise RunError(message) from error
         yield

@@ -158,17 +158,14 @@ def load_policy(run: Path, *, trust: bool = False) -> TrainedPolicy:
     files = RunFiles(run)
     if files.policy.exists():
         return _load(files)
+    name = shown(run)
     if not run.is_dir():
-        raise RunError(
-            f"{shown(files.directory)}: there is no such directory; a run's has a policy.json"
-        )
+        raise RunError(f"{name}: there is no such directory; a run's has a policy.json")
     if not (files.sb3_policy.exists() and files.sb3_normaliser.exists()):
-        raise RunError(
-            f"{shown(files.directory)} has no policy.json; 'scripts/train.py --resume' finishes a run"
-        )
+        raise RunError(f"{name} has no policy.json; 'scripts/train.py --resume' finishes a run")
     if not trust:
         raise RunError(
-            f"{shown(files.directory)} has no policy.json, only Stable-Baselines3's policy.zip and "
+            f"{name} has no policy.json, only Stable-Baselines3's policy.zip and "
             "vecnormalize.pkl: pickles, which run any program that their maker put into them; "
             "--trust reads them all the same"
         )
