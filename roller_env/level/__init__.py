@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from roller_env.level.check import check_level
-from roller_env.level.errors import LevelError, Problem
+from roller_env.level.errors import LevelError
 from roller_env.level.load import (
     level_json_schema,
     levels_directory,
@@ -12,6 +12,7 @@ from roller_env.level.load import (
     shipped_levels,
 )
 from roller_env.level.schema import Level
+from roller_env.problems import Problem
 
 __all__ = [
     "Level",

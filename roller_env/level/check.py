@@ -15,7 +15,6 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.level.errors import FieldPath, Problem, listed, quoted
 from roller_env.level.expand import Float64, Solid, coin_positions, rotation_matrix, solids
 from roller_env.level.schema import (
     BUILT_IN_MATERIALS,
@@ -28,6 +27,7 @@ from roller_env.level.schema import (
     Level,
     Plate,
 )
+from roller_env.problems import FieldPath, Problem, listed, quoted
 
 Unit = Literal["metre", "quant"]
 

@@ -19,10 +19,11 @@ from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema
 
 from roller_env.level.check import Unit, check_level
-from roller_env.level.errors import LevelError, Problem, listed, quoted
+from roller_env.level.errors import LevelError
 from roller_env.level.messages import explain
 from roller_env.level.schema import METRES_PER_UNIT, SCALE_KEY, Level
-from roller_env.level.yaml_tree import MAX_BYTES, Node, read_tree
+from roller_env.problems import Problem, listed, quoted
+from roller_env.yaml_tree import MAX_BYTES, Node, YamlError, read_tree
 
 SUFFIXES: Final = (".yaml", ".yml")
 
@@ -63,7 +64,10 @@ def parse_level(text: str, filename: str = "<text>") -> Level:
     Raises:
         LevelError: the level has problems; all of them are in ``problems``.
     """
-    root = read_tree(text, filename)
+    try:
+        root = read_tree(text, filename)
+    except YamlError as error:
+        raise LevelError(error.problems) from None
     unit = _unit(root)
     try:
         level = Level.model_validate(root.plain(), context={SCALE_KEY: METRES_PER_UNIT[unit]})

@@ -14,9 +14,9 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 from pydantic_core.core_schema import ErrorType
 
-from roller_env.level.errors import FieldPath, Problem, listed, quoted
 from roller_env.level.schema import COLOUR_PATTERN, NAME_PATTERN, Level
-from roller_env.level.yaml_tree import Node
+from roller_env.problems import FieldPath, Problem, listed, quoted
+from roller_env.yaml_tree import Node
 
 _PATTERNS: Final = {
     NAME_PATTERN: "a letter, then letters, digits, '_' or '-', at most 64 in all",

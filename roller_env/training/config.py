@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from roller_env.config import make_config
 from roller_env.game.rewards import RewardWeights
-from roller_env.level.errors import Problem, listed
+from roller_env.problems import Problem, listed
 
 Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
 PositiveInt = Annotated[int, Field(gt=0)]

@@ -10,8 +10,8 @@ import pytest
 
 from roller_env.level import check_level, parse_level
 from roller_env.level.check import CONTACT_TOLERANCE_M
-from roller_env.level.errors import FieldPath
 from roller_env.level.schema import BUILT_IN_MATERIALS, MAX_COINS, MAX_PIECES, PLATE_HIT_HEIGHT_M
+from roller_env.problems import FieldPath
 from roller_env.units import quants
 from tests.level.samples import COMPLETE, small_level
 

@@ -1,0 +1,108 @@
+"""What is said when a file is wrong: one `Problem` a fault, all of them in one `ProblemsError`."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+FieldPath = tuple[str | int, ...]
+"""Where in a file something stands, as pydantic writes it: ``("coins", 3, "line", "count")``."""
+
+MAX_PROBLEMS: Final = 1_000
+"""Faults that are looked for; a file of the wrong kind altogether could have a million."""
+
+MAX_PROBLEMS_PRINTED: Final = 50
+"""The others are in `ProblemsError.problems`."""
+
+_PLAIN_KEY: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,63}")
+_LONG_TEXT: Final = 64
+_LONG_LIST: Final = 20
+_MANY_NAMES: Final = 1_000
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One fault.
+
+    Attributes:
+        path: the field at fault; empty for the whole file.
+        message: what was found; what is allowed.
+        filename: the file, or None for what was built in Python.
+        line: line in the file, from 1; None where there is none.
+        column: column in the file, from 1; None where there is none.
+        written: the name that was written, when names are what is at fault.
+        known: the names that could have been meant.
+    """
+
+    path: FieldPath
+    message: str
+    filename: str | None = None
+    line: int | None = None
+    column: int | None = None
+    written: str = ""
+    known: tuple[str, ...] = ()
+
+    @property
+    def field(self) -> str:
+        """The path as people write it, such as ``coins[3].line.count``."""
+        return field_name(self.path)
+
+    @property
+    def nearest(self) -> str | None:
+        """The known name that is nearest to the written one, if any is near."""
+        if len(self.written) > _LONG_TEXT or len(self.known) > _MANY_NAMES:
+            return None
+        lower = {name.lower(): name for name in self.known}
+        near = difflib.get_close_matches(self.written.lower(), lower, n=1, cutoff=0.6)
+        return lower[near[0]] if near else None
+
+    def __str__(self) -> str:
+        place = [self.filename, self.line, self.column]
+        where = ":".join(str(part) for part in place if part is not None)
+        said = ": ".join(part for part in (where, self.field, self.message) if part)
+        return said if self.nearest is None else f"{said} (did you mean '{self.nearest}'?)"
+
+
+class ProblemsError(ValueError):
+    """A file, or what stands for one, that cannot be used.
+
+    Attributes:
+        problems: everything that is wrong with it, in the order of the file.
+    """
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__(self.problems)
+
+    def __str__(self) -> str:
+        lines = [str(problem) for problem in self.problems[:MAX_PROBLEMS_PRINTED]]
+        more = len(self.problems) - len(lines)
+        return "\n".join([*lines, f"... and {more} more problems"] if more else lines)
+
+
+def field_name(path: FieldPath) -> str:
+    """Return ``coins[3].line.count`` for ``("coins", 3, "line", "count")``."""
+    name = ""
+    for part in path:
+        if isinstance(part, int):
+            name += f"[{part}]"
+        elif _PLAIN_KEY.fullmatch(part):
+            name += f".{part}" if name else part
+        else:
+            name += f"[{quoted(part)}]"
+    return name
+
+
+def quoted(text: str) -> str:
+    """Return the text in quotes on one line, shortened when it is long."""
+    return repr(text if len(text) <= _LONG_TEXT else text[: _LONG_TEXT - 3] + "...")
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return the names in quotes, with commas between them; a long list is cut short."""
+    shown = ", ".join(quoted(name) for name in names[:_LONG_LIST])
+    more = len(names) - _LONG_LIST
+    return f"{shown} and {more} more" if more > 0 else shown
