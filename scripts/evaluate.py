@@ -15,7 +15,8 @@ from typing import Annotated
 
 import tyro
 
-from roller_env.level.errors import LevelError, shown
+from roller_env.level.errors import LevelError
+from roller_env.problems import shown
 from roller_env.training import ConfigError, load_policy
 from roller_env.training.files import RunError, RunFiles
 from roller_env.training.pictures import draw_paths, record_video

@@ -18,7 +18,8 @@ from typing import Annotated
 
 import tyro
 
-from roller_env.level.errors import LevelError, shown
+from roller_env.level.errors import LevelError
+from roller_env.problems import shown
 from roller_env.training import ConfigError, TrainingRun, load_config, train
 from roller_env.training.checkpoint import CheckpointError
 from roller_env.training.demonstrations import DemonstrationError

@@ -12,8 +12,8 @@ from typing import Any
 
 from roller_env.config import EnvConfig, LevelSource, make_config
 from roller_env.envs.spaces import shape_observation
-from roller_env.level.errors import shown
 from roller_env.physics.presets import PhysicsPreset, physics_preset
+from roller_env.problems import shown
 from roller_env.simulation import Simulation
 from roller_env.training.files import RunError
 from roller_env.training.policy import Policy, TrainedPolicy, load_policy

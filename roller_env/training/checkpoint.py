@@ -34,7 +34,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from roller_env.envs.sb3 import VecSnapshot
 from roller_env.game.cameras import MODES
-from roller_env.level.errors import shown
+from roller_env.problems import shown
 from roller_env.simulation import Snapshot
 from roller_env.training.config import TrainingConfig
 from roller_env.training.files import RunError, read_whole, write_atomically

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from roller_env.level.errors import quoted, shown
+from roller_env.problems import quoted, shown
 
 MAX_NAME_BYTES: Final = 150
 """Of a run's name; the agent's replays carry it with them."""

@@ -27,7 +27,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
 
 from roller_env import __version__
-from roller_env.level.errors import field_name, shown
+from roller_env.problems import field_name, shown
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.files import RunError, RunFiles, read_whole, write_atomically
 from roller_env.training.network import network_of, network_spaces

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from roller_env import __version__
 from roller_env.envs.sb3 import RollerVecEnv
-from roller_env.level.errors import shown
+from roller_env.problems import shown
 from roller_env.training.behaviour_cloning import start_from_demonstrations
 from roller_env.training.checkpoint import CheckpointError, Progress, load_checkpoint
 from roller_env.training.config import TrainingConfig, load_config
