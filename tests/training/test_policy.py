@@ -31,18 +31,31 @@ from roller_env.training.checkpoint import CheckpointError, load_checkpoint
 from roller_env.training.config import ConfigError, TrainingConfig, load_config
 from roller_env.training.demonstrations import DemonstrationError, load_demonstrations
 from roller_env.training.files import RunError, RunFiles
-from roller_env.training.policy import TrainedPolicy, load_policy, save_policy
+from roller_env.training.policy import load_policy, save_policy
 from roller_env.training.ppo import learn, make_environments, new_model
 from roller_env.training.run import train
 from tests.training.small import small_config
 
+KNOWN_ERRORS = (
+    CheckpointError,
+    ConfigError,
+    DemonstrationError,
+    LevelError,
+    ReplayError,
+    RunError,
+)
 KINDS: dict[str, dict[str, Any]] = {
     "state and directions": {},
     "dict and keys": {"environment": {"observation": "dict", "action": "keys"}},
     "rays and force": {"environment": {"observation": "rays", "action": "force"}},
     "nothing normalised": {"normalise_observations": False, "normalise_rewards": False},
     "three layers of elu": {
-        "ppo": {"rollout_steps": 16, "hidden_sizes": [5, 7, 3], "activation": "elu"}
+        "ppo": {
+            "rollout_steps": 16,
+            "batch_size": 64,
+            "hidden_sizes": [5, 7, 3],
+            "activation": "elu",
+        }
     },
 }
 
@@ -133,7 +146,7 @@ def edited(files: RunFiles, edit: Callable[[dict[str, Any]], None]) -> RunFiles:
 def test_a_loaded_policy_acts_with_the_bits_of_the_trained_one(
     tmp_path: Path, changes: dict[str, Any]
 ) -> None:
-    config = small_config(**{"ppo": {"rollout_steps": 16, "batch_size": 64}} | changes)
+    config = small_config(**changes)
     model = new_model(config, make_environments(config))
     model.learn(128)
     normaliser = model.get_vec_normalize_env()
@@ -175,14 +188,18 @@ def test_a_pickle_under_any_name_of_a_run_is_never_executed(
             for name in spoilt:
                 (files.directory / name).write_bytes(content)
             for read in readers(files):
-                try:
-                    read()
-                except (RunError, CheckpointError, ConfigError, LevelError, ReplayError) as error:
-                    assert str(error).isprintable()
-                except DemonstrationError:
-                    pass
+                assert complaint(read).isprintable()
             shutil.rmtree(files.directory)
     assert not hostile.mark.exists()
+
+
+def complaint(read: Callable[[], object]) -> str:
+    """Return what is said against reading; nothing if it can be read."""
+    try:
+        read()
+    except KNOWN_ERRORS as error:
+        return str(error)
+    return ""
 
 
 def readers(files: RunFiles) -> list[Callable[[], object]]:
@@ -257,11 +274,8 @@ def test_a_description_with_any_byte_wrong_is_a_policy_or_a_clear_error(
     files = RunFiles(tmp_path_factory.mktemp("damaged"))
     shutil.copy(run / "policy.safetensors", files.weights)
     files.policy.write_bytes(damaged((run / "policy.json").read_bytes(), data))
-    try:
-        assert isinstance(load_policy(files.directory), TrainedPolicy)
-    except RunError as error:
-        assert str(files.directory) in str(error)
-        assert "policy." in str(error)
+    said = complaint(lambda: load_policy(files.directory))
+    assert not said or said.startswith(f"{files.directory}/policy.")
 
 
 def damaged(content: bytes, data: st.DataObject) -> bytes:
