@@ -57,7 +57,8 @@ def main(arguments: Arguments) -> None:
     seed = () if arguments.seed is None else (f"seed={arguments.seed}",)
     demos = () if arguments.demos is None else (f"demonstrations={json.dumps(arguments.demos)}",)
     config = load_config(arguments.config, (*arguments.set, *seed, *demos))
-    name = arguments.name or f"{arguments.config.stem}-seed{config.seed}"
+    default = f"{arguments.config.stem}-seed{config.seed}"
+    name = default if arguments.name is None else arguments.name
     directory = run_directory(arguments.runs, name)
     algorithm, level = config.algorithm.upper(), shown(config.level)
     print(f"Training {algorithm} on {level}, seed {config.seed}: {shown(directory)}")

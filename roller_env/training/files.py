@@ -171,7 +171,7 @@ def run_directory(runs: Path, name: str) -> Path:
     Raises:
         RunError: no file can be called that, or it would be outside ``runs``.
     """
-    is_one_name = Path(name).name == name and not name.startswith(".")
+    is_one_name = name != "" and Path(name).name == name and not name.startswith(".")
     if not (is_one_name and name.isprintable() and len(os.fsencode(name)) <= MAX_NAME_BYTES):
         raise RunError(
             f"name: found {quoted(name)}; must be a name for a directory inside {shown(runs)}: "

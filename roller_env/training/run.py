@@ -165,11 +165,12 @@ def _unwritable(error: OSError, files: RunFiles) -> str:
     where = shown(error.filename or files.directory)
     try:
         steps = load_checkpoint(files.checkpoint).progress.steps
-        kept = f"kept is the training up to its checkpoint at {steps:,} steps"
     except CheckpointError:
-        kept = "no checkpoint was kept yet"
-    again = "--resume goes on from there" if kept.startswith("kept") else "start it again"
-    return f"{where}: {fault}; {kept}. When it can be written to, {again}"
+        return f"{where}: {fault}; nothing was kept yet. When it can be written to, --resume begins"
+    return (
+        f"{where}: {fault}; kept is the training up to its checkpoint at {steps:,} steps. When it "
+        "can be written to, --resume goes on from there"
+    )
 
 
 def _summary(config: TrainingConfig, progress: Progress, rest_s: float) -> dict[str, Any]:
