@@ -111,6 +111,14 @@ def shown(name: object) -> str:
     return text if text.isprintable() else repr(text)
 
 
+def printable(text: object) -> str:
+    """Return lines with every character that cannot be printed escaped, for a terminal."""
+    return "".join(
+        character if character.isprintable() or character == "\n" else repr(character)[1:-1]
+        for character in str(text)
+    )
+
+
 def listed(names: Sequence[str]) -> str:
     """Return the names in quotes, with commas between them; a long list is cut short."""
     first = ", ".join(quoted(name) for name in names[:_LONG_LIST])

@@ -16,7 +16,7 @@ from typing import Annotated
 import tyro
 
 from roller_env.level.errors import LevelError
-from roller_env.problems import shown
+from roller_env.problems import printable, shown
 from roller_env.training import ConfigError, load_policy
 from roller_env.training.files import RunError, RunFiles
 from roller_env.training.pictures import draw_paths, record_video
@@ -77,6 +77,6 @@ if __name__ == "__main__":
     try:
         main(tyro.cli(Arguments, description=__doc__))
     except (ConfigError, RunError, LevelError) as error:
-        sys.exit(f"error: {error}")
+        sys.exit(f"error: {printable(error)}")
     except OSError as error:
         sys.exit(f"error: {shown(error.filename or 'output')}: {error.strerror or error}")

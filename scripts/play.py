@@ -33,6 +33,7 @@ from roller_env.play.server import (
 )
 from roller_env.play.session import GameSession, Player, play_config
 from roller_env.play.sound import CoinSound
+from roller_env.problems import printable
 from roller_env.replay import datasets
 from roller_env.replay.keeper import ReplayKeeper
 
@@ -152,4 +153,4 @@ if __name__ == "__main__":
     try:
         main(tyro.cli(Arguments, description=__doc__))
     except (RuntimeError, ValueError) as error:
-        sys.exit(f"error: {error}")
+        sys.exit(f"error: {printable(error)}")

@@ -19,7 +19,7 @@ from typing import Annotated
 import tyro
 
 from roller_env.level.errors import LevelError
-from roller_env.problems import shown
+from roller_env.problems import printable, shown
 from roller_env.training import ConfigError, TrainingRun, load_config, train
 from roller_env.training.checkpoint import CheckpointError
 from roller_env.training.demonstrations import DemonstrationError
@@ -93,6 +93,6 @@ if __name__ == "__main__":
     try:
         main(tyro.cli(Arguments, description=__doc__))
     except (ConfigError, RunError, CheckpointError, DemonstrationError, LevelError) as error:
-        sys.exit(f"error: {error}")
+        sys.exit(f"error: {printable(error)}")
     except KeyboardInterrupt:
         sys.exit("\nstopped; --resume goes on from the last checkpoint")
