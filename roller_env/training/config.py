@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -263,7 +264,7 @@ def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
 _Dumper.add_representer(str, _text)
 
 
-def load_config(file: Path, overrides: Sequence[str] = ()) -> TrainingConfig:
+def load_config(file: str | os.PathLike[str], overrides: Sequence[str] = ()) -> TrainingConfig:
     """Read a configuration.
 
     Args:
@@ -274,9 +275,10 @@ def load_config(file: Path, overrides: Sequence[str] = ()) -> TrainingConfig:
     Raises:
         ConfigError: unreadable, unknown field, or a value that is not allowed; says where.
     """
+    path = Path(file)
     try:
-        root = read_tree(_content(file), str(file))
-        source = _Source(root, str(file))
+        root = read_tree(_content(path), str(path))
+        source = _Source(root, str(path))
         for override in overrides:
             source.override(override)
     except YamlError as error:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 import pickle
 from importlib.metadata import version
 from pathlib import Path
@@ -142,7 +143,7 @@ def save_policy(model: PPO, config: TrainingConfig, files: RunFiles) -> None:
     normaliser.save(str(files.sb3_normaliser))
 
 
-def load_policy(run: Path, *, trust: bool = False) -> TrainedPolicy:
+def load_policy(run: str | os.PathLike[str], *, trust: bool = False) -> TrainedPolicy:
     """Return the agent a run left behind.
 
     Args:
@@ -155,11 +156,11 @@ def load_policy(run: Path, *, trust: bool = False) -> TrainedPolicy:
         RunError: not a run, its training has not ended yet, its files are damaged, or they are of
             the kind that can execute and that is not trusted.
     """
-    files = RunFiles(run)
+    files = RunFiles(Path(run))
     if files.policy.exists():
         return _load(files)
     name = shown(run)
-    if not run.is_dir():
+    if not files.directory.is_dir():
         raise RunError(f"{name}: there is no such directory; a run's has a policy.json")
     if not (files.sb3_policy.exists() and files.sb3_normaliser.exists()):
         raise RunError(f"{name} has no policy.json; 'scripts/train.py --resume' finishes a run")

@@ -22,7 +22,7 @@ from roller_env.training.evaluate import (
     proportion,
     rows_and_repeats,
 )
-from roller_env.training.policy import Observations
+from roller_env.training.normalisation import Observations
 
 Z95 = NormalDist().inv_cdf(0.975)
 FORWARD = 1
