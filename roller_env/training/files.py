@@ -143,7 +143,9 @@ def write_atomically(file: Path, content: bytes | str) -> None:
     data = content.encode() if isinstance(content, str) else content
     temporary = file.with_name(file.name + ".tmp")
     try:
-        with temporary.open("wb") as stream:
+        # Not written through: it may be the half copy of a dead process, or a link to elsewhere.
+        temporary.unlink(missing_ok=True)
+        with temporary.open("xb") as stream:
             stream.write(data)
             stream.flush()
             os.fsync(stream.fileno())
@@ -188,7 +190,7 @@ def only_one_process(directory: Path) -> Iterator[None]:
         RunError: another process is training this run.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    with (directory / ".lock").open("w") as lock:
+    with (directory / ".lock").open("a") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:

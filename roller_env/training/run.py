@@ -12,6 +12,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
+from pydantic_core import from_json
+
 from roller_env import __version__
 from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.problems import shown
@@ -20,7 +22,13 @@ from roller_env.training.checkpoint import CheckpointError, Progress, load_check
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.demonstrations import Demonstration, load_demonstrations
 from roller_env.training.evaluate import Evaluation, evaluate, rows_and_repeats
-from roller_env.training.files import RunError, RunFiles, only_one_process, write_atomically
+from roller_env.training.files import (
+    RunError,
+    RunFiles,
+    only_one_process,
+    read_whole,
+    write_atomically,
+)
 from roller_env.training.pictures import draw_paths, record_video
 from roller_env.training.policy import Policy, load_policy, save_policy
 from roller_env.training.ppo import learn
@@ -29,6 +37,8 @@ from roller_env.training.report import draw_learning_curve, markdown_table, writ
 
 EVALUATION_SEED_OFFSET: Final = 1_000_000
 """Added to a training's seed, so that an agent is judged on starts it was not trained on."""
+
+MAX_SUMMARY_BYTES: Final = 2**24
 
 _PACKAGES: Final = ("mujoco", "gymnasium", "stable-baselines3", "torch", "numpy")
 
@@ -100,7 +110,7 @@ def _train(
 ) -> TrainingRun:
     _claim(config, files, resume)
     if files.summary.exists():
-        return TrainingRun(files, json.loads(files.summary.read_text()), was_finished=True)
+        return TrainingRun(files, _read_summary(files.summary), was_finished=True)
     if demonstrations is not None:
         print(start_from_demonstrations(config, demonstrations, files), flush=True)
     model, progress = learn(config, files)
@@ -157,6 +167,17 @@ def _claim(config: TrainingConfig, files: RunFiles, resume: bool) -> None:
             + "\n".join(f"  {difference}" for difference in differences)
             + "\nchoose another --name, or ask for what it was started with"
         )
+
+
+def _read_summary(file: Path) -> dict[str, Any]:
+    try:
+        summary = from_json(read_whole(file, MAX_SUMMARY_BYTES))
+    except ValueError as error:
+        message = f"{shown(file)}: damaged ({error}); remove it to have the run evaluated again"
+        raise RunError(message) from None
+    if not isinstance(summary, dict):
+        raise RunError(f"{shown(file)}: damaged; remove it to have the run evaluated again")
+    return summary
 
 
 def _unwritable(error: OSError, files: RunFiles) -> str:

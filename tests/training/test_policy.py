@@ -6,9 +6,11 @@ import hashlib
 import json
 import os
 import pickle
+import runpy
 import shutil
 import zipfile
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -381,6 +383,37 @@ def test_stable_baselines3_loads_the_export_as_the_documentation_says(run: Path)
         actions: npt.NDArray[Any]
         actions, _ = model.predict(normaliser.normalize_obs(seen), deterministic=True)
         assert np.array_equal(policy(seen), actions)
+
+
+@pytest.mark.parametrize("name", ["config.yaml", "progress.csv", "run.json", "checkpoint.zip"])
+def test_a_run_with_a_damaged_file_is_not_gone_on_with(
+    copy: RunFiles, hostile: Hostile, name: str
+) -> None:
+    config = small_config(total_steps=256 if name == "progress.csv" else 128)
+    copy.config.write_text(config.to_yaml())
+    for content in (*hostile.contents, b"a,b\n1,2", b"[" * 10**5):
+        # What has no end of line is taken for a last row that was not finished.
+        (copy.directory / name).write_bytes(content + b"\n")
+        with pytest.raises(KNOWN_ERRORS) as caught:
+            train(config, copy.directory, resume=True)
+        assert str(caught.value).startswith(str(copy.directory / name))
+    assert not hostile.mark.exists()
+
+
+@pytest.mark.parametrize("trust", [False, True])
+def test_the_command_that_evaluates_needs_to_be_told_to_trust(
+    copy: RunFiles,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    trust: bool,
+) -> None:
+    directory = str(without_safe_files(copy).directory)
+    options = ["--episodes", "2", *(["--trust"] if trust else [])]
+    monkeypatch.setattr("sys.argv", ["evaluate.py", directory, *options])
+    script = str(Path(__file__).parents[2] / "scripts" / "evaluate.py")
+    with nullcontext() if trust else pytest.raises(SystemExit, match=r"^error: .*--trust"):
+        runpy.run_path(script, run_name="__main__")
+    assert ("success rate" in capsys.readouterr().out) == trust
 
 
 def test_a_checkpoint_of_the_old_kind_is_refused_and_not_begun_anew(
