@@ -60,7 +60,8 @@ class Problem:
         return lower[near[0]] if near else None
 
     def __str__(self) -> str:
-        place = [self.filename, self.line, self.column]
+        filename = None if self.filename is None else shown(self.filename)
+        place = [filename, self.line, self.column]
         where = ":".join(str(part) for part in place if part is not None)
         said = ": ".join(part for part in (where, self.field, self.message) if part)
         return said if self.nearest is None else f"{said} (did you mean '{self.nearest}'?)"
@@ -101,8 +102,25 @@ def quoted(text: str) -> str:
     return repr(text if len(text) <= _LONG_TEXT else text[: _LONG_TEXT - 3] + "...")
 
 
+def shown(name: object) -> str:
+    """Return a name as it is if all of it can be printed, else in quotes with the rest escaped.
+
+    A file's name may hold what a terminal takes for commands.
+    """
+    text = str(name)
+    return text if text.isprintable() else repr(text)
+
+
+def printable(text: object) -> str:
+    """Return lines with every character that cannot be printed escaped, for a terminal."""
+    return "".join(
+        character if character.isprintable() or character == "\n" else repr(character)[1:-1]
+        for character in str(text)
+    )
+
+
 def listed(names: Sequence[str]) -> str:
     """Return the names in quotes, with commas between them; a long list is cut short."""
-    shown = ", ".join(quoted(name) for name in names[:_LONG_LIST])
+    first = ", ".join(quoted(name) for name in names[:_LONG_LIST])
     more = len(names) - _LONG_LIST
-    return f"{shown} and {more} more" if more > 0 else shown
+    return f"{first} and {more} more" if more > 0 else first

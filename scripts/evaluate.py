@@ -16,7 +16,8 @@ from typing import Annotated
 import tyro
 
 from roller_env.level.errors import LevelError
-from roller_env.training import load_policy
+from roller_env.problems import printable, shown
+from roller_env.training import ConfigError, load_policy
 from roller_env.training.files import RunError, RunFiles
 from roller_env.training.pictures import draw_paths, record_video
 from roller_env.training.replays import save_replays
@@ -43,13 +44,17 @@ class Arguments:
     replays: Path | None = None
     """Directory for a replay of every episode; scripts/replay.py verifies, shows and films them."""
 
+    trust: bool = False
+    """Also play an agent that is kept as pickles, as Stable-Baselines3 saves it. A pickle runs any
+    program its maker put into it: only for runs of people you trust."""
+
     output: Path | None = None
     """Directory for the table, the episodes, the paths from above and a video."""
 
 
 def main(arguments: Arguments) -> None:
     """Do what the command line says."""
-    policy = load_policy(arguments.run)
+    policy = load_policy(arguments.run, trust=arguments.trust)
     config = policy.config
     if arguments.level is not None:
         config = config.model_copy(update={"level": arguments.level})
@@ -57,7 +62,7 @@ def main(arguments: Arguments) -> None:
     print(markdown_table(evaluation, config))
     if arguments.replays is not None:
         save_replays(evaluation, config, arguments.replays, f"policy {arguments.run.name}")
-        print(f"{len(evaluation)} replays written to {arguments.replays}")
+        print(f"{len(evaluation)} replays written to {shown(arguments.replays)}")
     if arguments.output is None:
         return
     arguments.output.mkdir(parents=True, exist_ok=True)
@@ -65,11 +70,13 @@ def main(arguments: Arguments) -> None:
     write_evaluation(evaluation, config, files)
     draw_paths(evaluation, files.paths)
     record_video(policy, config, evaluation.seed, files.video)
-    print(f"written to {arguments.output}")
+    print(f"written to {shown(arguments.output)}")
 
 
 if __name__ == "__main__":
     try:
         main(tyro.cli(Arguments, description=__doc__))
-    except (RunError, LevelError) as error:
-        sys.exit(f"error: {error}")
+    except (ConfigError, RunError, LevelError) as error:
+        sys.exit(f"error: {printable(error)}")
+    except OSError as error:
+        sys.exit(f"error: {shown(error.filename or 'output')}: {error.strerror or error}")

@@ -21,6 +21,7 @@ from tqdm import tqdm
 
 from roller_env.config import EnvConfig
 from roller_env.level import Level, LevelError, levels_directory, load_level, shipped_levels
+from roller_env.problems import printable
 from roller_env.replay import load_replay, record_episode, save_replay, verify
 from roller_env.replay.scripted import PLAYER, ScriptedPlayer
 
@@ -85,4 +86,4 @@ if __name__ == "__main__":
     try:
         sys.exit(main(tyro.cli(Arguments, description=__doc__)))
     except (LevelError, ValueError) as error:
-        sys.exit(f"error: {error}")
+        sys.exit(f"error: {printable(error)}")

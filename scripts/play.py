@@ -33,6 +33,7 @@ from roller_env.play.server import (
 )
 from roller_env.play.session import GameSession, Player, play_config
 from roller_env.play.sound import CoinSound
+from roller_env.problems import printable
 from roller_env.replay import datasets
 from roller_env.replay.keeper import ReplayKeeper
 
@@ -67,6 +68,10 @@ class Arguments:
 
     policy: Path | None = None
     """A run's directory: its agent plays until you press a key."""
+
+    trust: bool = False
+    """Also play an agent that is kept as pickles, as Stable-Baselines3 saves it. A pickle runs any
+    program its maker put into it: only for runs of people you trust."""
 
     replays: Path | None = None
     """Directory for a replay of every game; scripts/replay.py verifies, shows and films them."""
@@ -122,7 +127,9 @@ def game_of(arguments: Arguments) -> tuple[EnvConfig, Player | None]:
     # Imported here: it takes torch, which a person's game does not need.
     from roller_env.play.autopilot import load_autopilot
 
-    return load_autopilot(arguments.policy, arguments.level, arguments.physics)
+    return load_autopilot(
+        arguments.policy, arguments.level, arguments.physics, trust=arguments.trust
+    )
 
 
 def session_maker(
@@ -146,4 +153,4 @@ if __name__ == "__main__":
     try:
         main(tyro.cli(Arguments, description=__doc__))
     except (RuntimeError, ValueError) as error:
-        sys.exit(f"error: {error}")
+        sys.exit(f"error: {printable(error)}")

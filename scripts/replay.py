@@ -18,6 +18,7 @@ import tyro
 
 from roller_env.drawing.opengl import DrawingUnavailable
 from roller_env.game.cameras import MODES
+from roller_env.problems import printable
 from roller_env.replay import Replay, ReplayError, load_replay, shipped_replays, verify
 from roller_env.replay.pictures import contact_sheet, film
 
@@ -107,9 +108,9 @@ def _check(arguments: Arguments) -> None:
 
 
 def _about(replay: Replay) -> str:
-    result = replay.result
+    result, player = replay.result, printable(replay.player) or "unknown player"
     return (
-        f"{replay.level.name}: {replay.player or 'unknown player'}, {len(replay)} steps, "
+        f"{replay.level.name}: {player}, {len(replay)} steps, "
         f"{result.time_s:.2f} s, {result.outcome}, {result.coins} coins "
         f"({result.score_percent:.0f} %)"
     )
@@ -119,4 +120,4 @@ if __name__ == "__main__":
     try:
         sys.exit(main(tyro.cli(Arguments, description=__doc__)))
     except (ReplayError, DrawingUnavailable) as error:
-        sys.exit(f"error: {error}")
+        sys.exit(f"error: {printable(error)}")

@@ -19,10 +19,11 @@ from typing import Annotated
 import tyro
 
 from roller_env.level.errors import LevelError
+from roller_env.problems import printable, shown
 from roller_env.training import ConfigError, TrainingRun, load_config, train
 from roller_env.training.checkpoint import CheckpointError
 from roller_env.training.demonstrations import DemonstrationError
-from roller_env.training.files import RunError
+from roller_env.training.files import RunError, run_directory
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +34,7 @@ class Arguments:
     """What to train, and how."""
 
     name: str | None = None
-    """The run's; by default the configuration's file name and the seed."""
+    """The run's; by default the name of the configuration's file and the seed."""
 
     seed: int | None = None
     """Instead of the configuration's."""
@@ -56,21 +57,24 @@ def main(arguments: Arguments) -> None:
     seed = () if arguments.seed is None else (f"seed={arguments.seed}",)
     demos = () if arguments.demos is None else (f"demonstrations={json.dumps(arguments.demos)}",)
     config = load_config(arguments.config, (*arguments.set, *seed, *demos))
-    name = arguments.name or f"{arguments.config.stem}-seed{config.seed}"
-    directory = arguments.runs / name
-    print(f"Training {config.algorithm.upper()} on {config.level}, seed {config.seed}: {directory}")
+    default = f"{arguments.config.stem}-seed{config.seed}"
+    name = default if arguments.name is None else arguments.name
+    directory = run_directory(arguments.runs, name)
+    algorithm, level = config.algorithm.upper(), shown(config.level)
+    print(f"Training {algorithm} on {level}, seed {config.seed}: {shown(directory)}")
     print_results(train(config, directory, resume=arguments.resume))
 
 
 def print_results(run: TrainingRun) -> None:
     """Say where everything is."""
     if run.was_finished:
-        print(f"{run.files.directory} is finished already; remove it to train it anew.")
+        print(f"{shown(run.files.directory)} is finished already; remove it to train it anew.")
         print(run.files.evaluation_table.read_text())
     files = run.files
     results = {
         "policy": files.policy,
-        "normalisation": files.normaliser,
+        "its weights": files.weights,
+        "the same for SB3": files.sb3_policy,
         "training log": files.progress,
         "TensorBoard": files.tensorboard,
         "learning curve": files.learning_curve,
@@ -82,13 +86,13 @@ def print_results(run: TrainingRun) -> None:
         "all about the run": files.summary,
     }
     for title, path in results.items():
-        print(f"  {title:<18} {path}" if path.exists() else f"  {title:<18} (not drawn)")
+        print(f"  {title:<18} {shown(path) if path.exists() else '(not drawn)'}")
 
 
 if __name__ == "__main__":
     try:
         main(tyro.cli(Arguments, description=__doc__))
     except (ConfigError, RunError, CheckpointError, DemonstrationError, LevelError) as error:
-        sys.exit(f"error: {error}")
+        sys.exit(f"error: {printable(error)}")
     except KeyboardInterrupt:
         sys.exit("\nstopped; --resume goes on from the last checkpoint")

@@ -98,7 +98,7 @@ def obstructions(level: Level, blocks: Sequence[Solid], positions: Float64) -> d
     Returns:
         For the index of each position that is not free, the field of the level that is there.
     """
-    margin = max(level.ball.radius - CONTACT_TOLERANCE_M, 0.0)
+    margin = max(level.ball.radius - TOUCHING_M, 0.0)
     inside = _inside(blocks, positions, margin)
     return {int(index): block.source for block, indices in inside for index in indices}
 

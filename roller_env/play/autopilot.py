@@ -13,6 +13,7 @@ from typing import Any
 from roller_env.config import EnvConfig, LevelSource, make_config
 from roller_env.envs.spaces import shape_observation
 from roller_env.physics.presets import PhysicsPreset, physics_preset
+from roller_env.problems import shown
 from roller_env.simulation import Simulation
 from roller_env.training.files import RunError
 from roller_env.training.policy import Policy, TrainedPolicy, load_policy
@@ -45,7 +46,11 @@ class Autopilot:
 
 
 def load_autopilot(
-    run: Path, level: LevelSource | None = None, physics: str | PhysicsPreset | None = None
+    run: Path,
+    level: LevelSource | None = None,
+    physics: str | PhysicsPreset | None = None,
+    *,
+    trust: bool = False,
 ) -> tuple[EnvConfig, Autopilot]:
     """Return the options of a game that a run's agent can play, and the agent.
 
@@ -53,14 +58,15 @@ def load_autopilot(
         run: directory of the run, such as ``runs/ppo_classic-seed0``.
         level: what to play; by default what the agent was trained on.
         physics: likewise; by default the one of its evaluation.
+        trust: see `load_policy`.
 
     Raises:
         RunError: not a run, or an agent that needs pictures.
     """
-    policy: TrainedPolicy = load_policy(run)
+    policy: TrainedPolicy = load_policy(run, trust=trust)
     trained = make_config(level=policy.config.level, **policy.config.evaluation_options)
     if trained.observation == "pixels":
-        raise RunError(f"{run}: its agent looks at pictures, which a page does not give it")
+        raise RunError(f"{shown(run)}: its agent looks at pictures, which a page does not give it")
     preset = physics_preset(physics or trained.physics)
     per_action = max(1, round(trained.control_dt_s / preset.dt_s))
     limit = trained.max_episode_steps

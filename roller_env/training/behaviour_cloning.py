@@ -16,7 +16,6 @@ import numpy.typing as npt
 import torch
 from gymnasium import spaces
 from stable_baselines3 import PPO
-from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 from tqdm import tqdm
 
@@ -24,6 +23,7 @@ from roller_env.training.checkpoint import Progress, save_checkpoint
 from roller_env.training.config import CloningConfig, TrainingConfig
 from roller_env.training.demonstrations import Demonstration, chosen
 from roller_env.training.files import RunFiles
+from roller_env.training.normalisation import WHOLE, statistics
 from roller_env.training.ppo import make_environments, new_model
 
 Float64 = npt.NDArray[np.float64]
@@ -142,10 +142,10 @@ def weigh_statistics(model: PPO, samples: float) -> None:
     """Let the statistics that were learnt weigh as much as those of so many samples, or more."""
     normaliser = model.get_vec_normalize_env()
     assert normaliser is not None
-    for statistics in (*_statistics(normaliser).values(), normaliser.ret_rms):
+    for known in (*statistics(normaliser).values(), normaliser.ret_rms):
         # Nothing was learnt of what still has the count it begins with.
-        if statistics.count > 1.0:
-            statistics.count = max(statistics.count, samples)
+        if known.count > 1.0:
+            known.count = max(known.count, samples)
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,23 +230,15 @@ def _joined(parts: Sequence[Any]) -> Any:
     return np.concatenate(parts)
 
 
-def _statistics(normaliser: VecNormalize) -> dict[str, RunningMeanStd]:
-    """Return the observations' running statistics by name; none if they are not normalised."""
-    if not normaliser.norm_obs:
-        return {}
-    statistics = normaliser.obs_rms
-    return dict(statistics) if isinstance(statistics, dict) else {"": statistics}
-
-
 def _learn_statistics(normaliser: VecNormalize, demonstrations: Sequence[Demonstration]) -> None:
     """Learn mean and variance of the observations, and the variance of the discounted rewards.
 
     As `VecNormalize` does, of which the rewards' running sum is.
     """
     seen = _joined([demonstration.observations for demonstration in demonstrations])
-    parts = seen if isinstance(seen, dict) else {"": seen}
-    for name, statistics in _statistics(normaliser).items():
-        statistics.update(parts[name])
+    parts = seen if isinstance(seen, dict) else {WHOLE: seen}
+    for name, known in statistics(normaliser).items():
+        known.update(parts[name])
     for demonstration in demonstrations:
         if demonstration.rewards is not None and normaliser.norm_reward:
             sums = demonstration.rewards.copy()

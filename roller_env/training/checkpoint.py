@@ -4,8 +4,9 @@ Everything the continuation depends on is inside: weights and optimizer, normali
 the state of every environment, of every random generator and of the step counter. A run that was
 killed and resumed therefore ends with the same bits as one that never stopped.
 
-The file is one header line with the SHA-256 of all that follows, and a zip archive. It holds
-pickles, as Stable-Baselines3's own files do: load only what you trained or trust.
+The file is one header line with the SHA-256 of all that follows, and an uncompressed zip archive of
+two members: ``state.json``, whatever is not an array, and ``arrays.safetensors``, whatever is.
+Nothing in it can be executed, whoever wrote it.
 """
 
 from __future__ import annotations
@@ -13,33 +14,48 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import pickle
 import random
 import zipfile
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
+import safetensors.numpy
 import torch
+from pydantic import ValidationError
+from pydantic_core import from_json
+from safetensors import SafetensorError
 from stable_baselines3 import PPO
+from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 
+from roller_env.envs.sb3 import VecSnapshot
+from roller_env.game.cameras import MODES
+from roller_env.problems import shown
+from roller_env.simulation import Snapshot
 from roller_env.training.config import TrainingConfig
-from roller_env.training.files import write_atomically
-from roller_env.training.practice import PracticeStarts
+from roller_env.training.files import RunError, read_whole, write_atomically
+from roller_env.training.normalisation import statistics
+from roller_env.training.practice import PracticeSnapshot, PracticeStarts, joined, separate
 
-_HEADER: Final = b"roller-checkpoint-1 sha256 "
+Tree = dict[str, Any]
+"""Names to arrays, to JSON's values, or to such trees."""
+
+MAX_BYTES: Final = 2**32
+
+_HEADER: Final = b"roller-checkpoint-2 sha256 "
 """Starts the file; the number is the format's, raised when an old file can no longer be read."""
 
 _HEADER_LENGTH: Final = len(_HEADER) + hashlib.sha256().digest_size * 2 + 1
-_MODEL, _NORMALISER, _RANDOM, _ENVIRONMENTS, _PROGRESS = (
-    "model.zip",
-    "vecnormalize.pkl",
-    "random.pkl",
-    "environments.pkl",
-    "progress.json",
-)
+_STATE, _ARRAYS = "state.json", "arrays.safetensors"
+_BETWEEN_NAMES: Final = "/"
+_VARYING: Final = ("physics", "game", "level_of_row", "generators")
+"""Of a `Snapshot`; its other fields are what the configuration says."""
+
+_REMEDY: Final = "remove the run's directory to train again from the start"
 
 
 class CheckpointError(RuntimeError):
@@ -64,33 +80,33 @@ class Checkpoint:
     """What a checkpoint file holds; `restore` brings it to life.
 
     Attributes:
+        file: where it was read.
         config: of the training.
         progress: when the checkpoint was written.
-        members: the rest, as bytes, by the names in the archive.
+        state: of the learner, the environments and the random generators.
     """
 
+    file: Path
     config: TrainingConfig
     progress: Progress
-    members: dict[str, bytes]
+    state: Tree
 
-    def restore(self, environments: PracticeStarts) -> PPO:
-        """Return the learner as it was, and set environments and random generators back too.
+    def restore(self, model: PPO) -> None:
+        """Put a learner, its environments and the random generators where they were.
 
         Args:
-            environments: new ones, made as the configuration says.
+            model: a new one, made as the configuration says.
+
+        Raises:
+            CheckpointError: the checkpoint is that of another learner.
         """
-        normaliser: VecNormalize = pickle.loads(self.members[_NORMALISER])
-        normaliser.set_venv(environments)
-        model = PPO.load(
-            io.BytesIO(self.members[_MODEL]), env=normaliser, device="cpu", force_reset=False
-        )
-        # Its result is replaced at once, but environments are stepped only after a reset.
-        environments.reset()
-        normaliser.returns, state = pickle.loads(self.members[_ENVIRONMENTS])
-        environments.restore(state)
-        # Last, because loading a model seeds the generators anew.
-        _set_random_state(pickle.loads(self.members[_RANDOM]))
-        return model
+        try:
+            _set_state(model, self.state)
+        except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
+            raise CheckpointError(
+                f"{shown(self.file)}: not of a training with this configuration ({error}); "
+                f"{_REMEDY}"
+            ) from error
 
 
 def save_checkpoint(file: Path, model: PPO, config: TrainingConfig, progress: Progress) -> None:
@@ -101,27 +117,21 @@ def save_checkpoint(file: Path, model: PPO, config: TrainingConfig, progress: Pr
         model: between two updates, with its environments inside a VecNormalize.
         config: of the training.
         progress: so far.
+
+    Raises:
+        OSError: the disk is full or not writable; the old checkpoint is still there.
     """
-    normaliser = model.get_vec_normalize_env()
-    assert normaliser is not None
-    environments = normaliser.venv
-    assert isinstance(environments, PracticeStarts)
-    stream = io.BytesIO()
-    model.save(stream)
-    members = {
-        _MODEL: stream.getvalue(),
-        _NORMALISER: pickle.dumps(normaliser),
-        # VecNormalize leaves its running returns out of its own pickle.
-        _ENVIRONMENTS: pickle.dumps((normaliser.returns, environments.snapshot())),
-        _RANDOM: pickle.dumps(_random_state()),
-        _PROGRESS: json.dumps(
-            {"progress": asdict(progress), "config": config.model_dump(mode="json")}
-        ).encode(),
+    flat = _flat(_state(model))
+    arrays = {name: value for name, value in flat.items() if isinstance(value, np.ndarray)}
+    facts = {
+        "config": config.model_dump(mode="json"),
+        "progress": asdict(progress),
+        "state": {name: value for name, value in flat.items() if name not in arrays},
     }
     archive = io.BytesIO()
-    with zipfile.ZipFile(archive, "w") as container:
-        for name, content in members.items():
-            container.writestr(name, content)
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_STORED) as container:
+        container.writestr(_STATE, json.dumps(facts))
+        container.writestr(_ARRAYS, safetensors.numpy.save(arrays))
     body = archive.getvalue()
     write_atomically(file, _HEADER + hashlib.sha256(body).hexdigest().encode() + b"\n" + body)
 
@@ -130,35 +140,266 @@ def load_checkpoint(file: Path) -> Checkpoint:
     """Read a checkpoint.
 
     Raises:
-        CheckpointError: not a checkpoint of this format, or damaged.
-        OSError: not readable.
+        CheckpointError: not readable, not a checkpoint of this format, or damaged.
     """
-    content = file.read_bytes()
+    try:
+        content = read_whole(file, MAX_BYTES)
+    except RunError as error:
+        raise CheckpointError(str(error)) from None
     header, body = content[:_HEADER_LENGTH], content[_HEADER_LENGTH:]
-    remedy = "remove the run's directory to train again from the start"
     if not header.startswith(_HEADER):
-        raise CheckpointError(f"{file}: not a checkpoint of this version of Roller; {remedy}")
+        message = f"{shown(file)}: not a checkpoint of this version of Roller; {_REMEDY}"
+        raise CheckpointError(message)
     if header != _HEADER + hashlib.sha256(body).hexdigest().encode() + b"\n":
-        raise CheckpointError(f"{file}: damaged (its content does not match its hash); {remedy}")
+        raise _damaged(file, "its content does not match its hash")
+    try:
+        facts, arrays = _members(body)
+        return Checkpoint(
+            file=file,
+            config=TrainingConfig.model_validate(facts["config"]),
+            progress=Progress(**facts["progress"]),
+            state=_nested({**facts["state"], **arrays}),
+        )
+    except (zipfile.BadZipFile, SafetensorError, ValidationError) as error:
+        raise _damaged(file, str(error)) from None
+    except (LookupError, TypeError, ValueError) as error:
+        raise _damaged(file, f"{type(error).__name__}: {error}") from None
+
+
+def _members(body: bytes) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
+    """Return the content of the archive's members; what is compressed in it is not unpacked."""
     with zipfile.ZipFile(io.BytesIO(body)) as container:
-        members = {name: container.read(name) for name in container.namelist()}
-    facts = json.loads(members.pop(_PROGRESS))
-    return Checkpoint(
-        config=TrainingConfig.model_validate(facts["config"]),
-        progress=Progress(**facts["progress"]),
-        members=members,
-    )
+        for name in (_STATE, _ARRAYS):
+            if container.getinfo(name).file_size > len(body):
+                raise ValueError(f"{name} is larger than the file")
+        return from_json(container.read(_STATE)), safetensors.numpy.load(container.read(_ARRAYS))
 
 
-def _random_state() -> dict[str, Any]:
+def _damaged(file: Path, fault: str) -> CheckpointError:
+    return CheckpointError(f"{shown(file)}: damaged ({fault}); {_REMEDY}")
+
+
+# A learner as a tree, and back -------------------------------------------------------------------
+
+
+def _state(model: PPO) -> Tree:
+    normaliser, environments = _wrappers(model)
+    policy, optimizer = model.policy.state_dict(), model.policy.optimizer.state_dict()
     return {
-        "python": random.getstate(),
-        "numpy": np.random.get_state(),  # noqa: NPY002  the generator SB3 shuffles samples with
-        "torch": torch.get_rng_state(),
+        "policy": {name: weights.numpy() for name, weights in policy.items()},
+        # What Adam is told is the configuration's; this is what it has found.
+        "optimizer": {
+            str(number): {name: value.numpy() for name, value in moments.items()}
+            for number, moments in optimizer["state"].items()
+        },
+        "learner": {
+            "steps": model.num_timesteps,
+            "updates": model._n_updates,
+            "observations": model._last_obs,
+            "episode_starts": model._last_episode_starts,
+        },
+        "normaliser": {
+            "observations": {
+                name: _moments(entry) for name, entry in statistics(normaliser).items()
+            },
+            "rewards": _moments(normaliser.ret_rms),
+            "returns": normaliser.returns,
+        },
+        "environments": _of_practice(environments.snapshot()),
+        "random": _random_state(),
     }
 
 
-def _set_random_state(state: dict[str, Any]) -> None:
-    random.setstate(state["python"])
+def _set_state(model: PPO, state: Tree) -> None:
+    normaliser, environments = _wrappers(model)
+    # Environments are stepped only after a reset, and what this learner would write shows which
+    # arrays a checkpoint of it has; all that it changes is replaced.
+    observations = normaliser.reset()
+    if state["learner"]["updates"]:
+        model._last_obs = observations
+        model._last_episode_starts = np.ones(model.n_envs, dtype=bool)
+    _check_arrays(_flat(state), _flat(_state(model)))
+    model.policy.load_state_dict(_tensors(state["policy"]))
+    optimizer = model.policy.optimizer
+    moments = {int(number): _tensors(m) for number, m in state.get("optimizer", {}).items()}
+    _check_moments(moments, [p for group in optimizer.param_groups for p in group["params"]])
+    optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
+    learner = state["learner"]
+    model.num_timesteps, model._n_updates = learner["steps"], learner["updates"]
+    model._last_obs = learner["observations"]
+    model._last_episode_starts = learner["episode_starts"]
+    for name, entry in statistics(normaliser).items():
+        _set_moments(entry, state["normaliser"]["observations"][name])
+    _set_moments(normaliser.ret_rms, state["normaliser"]["rewards"])
+    normaliser.returns = state["normaliser"]["returns"]
+    environments.restore(_practice(state["environments"], environments.snapshot()))
+    # Last, because making and resetting a learner draws numbers.
+    _set_random_state(state["random"])
+
+
+def _wrappers(model: PPO) -> tuple[VecNormalize, PracticeStarts]:
+    normaliser = model.get_vec_normalize_env()
+    assert normaliser is not None
+    environments = normaliser.venv
+    assert isinstance(environments, PracticeStarts)
+    return normaliser, environments
+
+
+def _moments(entry: RunningMeanStd) -> Tree:
+    return {
+        "mean": np.asarray(entry.mean),
+        "variance": np.asarray(entry.var),
+        "count": float(entry.count),
+    }
+
+
+def _set_moments(entry: RunningMeanStd, moments: Tree) -> None:
+    entry.mean, entry.var = moments["mean"], moments["variance"]
+    entry.count = float(moments["count"])
+
+
+def _of_practice(snapshot: PracticeSnapshot) -> Tree:
+    waypoints = [waypoint for waypoint, games in snapshot.games.items() for _ in games]
+    games = [game for games in snapshot.games.values() for game in games]
+    return {
+        "level": snapshot.environments.games.level.model_dump_json(),
+        "games": _of_snapshot(snapshot.environments.games),
+        "returns": snapshot.environments.returns,
+        "lengths": snapshot.environments.lengths,
+        "waypoint": snapshot.waypoint,
+        "from_start": snapshot.from_start,
+        "generator": snapshot.generator,
+        "kept_at": waypoints,
+        "kept": _of_snapshot(joined(games)) if games else {},
+    }
+
+
+def _practice(tree: Tree, own: PracticeSnapshot) -> PracticeSnapshot:
+    """Return the snapshot that a tree is, of the kind that the environments' own is."""
+    games = own.environments.games
+    if tree["level"] != games.level.model_dump_json():
+        raise ValueError(f"the level {games.level.name!r} has been changed since it was written")
+    kept: dict[int, list[Snapshot]] = {}
+    if tree["kept_at"]:
+        rows = separate(_snapshot(tree["kept"], games, len(tree["kept_at"])))
+        for waypoint, game in zip(tree["kept_at"], rows, strict=True):
+            kept.setdefault(int(waypoint), []).append(game)
+    return PracticeSnapshot(
+        environments=VecSnapshot(
+            games=_snapshot(tree["games"], games, len(tree["returns"])),
+            returns=tree["returns"],
+            lengths=tree["lengths"],
+        ),
+        games=kept,
+        waypoint=tree["waypoint"],
+        from_start=tree["from_start"],
+        generator=tree["generator"],
+    )
+
+
+def _of_snapshot(snapshot: Snapshot) -> Tree:
+    return {name: getattr(snapshot, name) for name in _VARYING}
+
+
+def _snapshot(tree: Tree, own: Snapshot, rows: int) -> Snapshot:
+    """Return the snapshot of so many rows that a tree is, of the environments that ``own`` is of.
+
+    Raises:
+        ValueError: arrays are missing or of another shape, or numbers point at what is not there.
+    """
+    wanted = _flat(_of_snapshot(own))
+    like = {
+        name: np.empty((rows, *value.shape[1:]), value.dtype)
+        for name, value in wanted.items()
+        if isinstance(value, np.ndarray)
+    }
+    _check_arrays(_flat(tree), {**wanted, **like})
+    route = own.level.route
+    # The compiled rules look these up without asking whether they are there.
+    for name, numbers, count in (
+        ("level_of_row", tree["level_of_row"], 1),
+        ("camera_mode", tree["game"]["camera_mode"], len(MODES)),
+        ("waypoint", tree["game"]["waypoint"], 1 if route is None else len(route.points)),
+    ):
+        if ((numbers < 0) | (numbers >= count)).any():
+            raise ValueError(f"{name}: found {numbers.tolist()}; must be 0 to {count - 1}")
+    generators = tuple(tree["generators"])
+    if len(generators) != rows:
+        raise ValueError(f"generators: found {len(generators)}; wanted {rows}")
+    return replace(own, **{**tree, "generators": generators})
+
+
+def _random_state() -> Tree:
+    return {
+        "python": random.getstate(),
+        # The generator SB3 shuffles samples with.
+        "numpy": np.random.get_state(legacy=False),  # noqa: NPY002
+        "torch": torch.get_rng_state().numpy(),
+    }
+
+
+def _set_random_state(state: Tree) -> None:
+    version, numbers, gauss = state["python"]
+    random.setstate((version, tuple(numbers), gauss))
     np.random.set_state(state["numpy"])  # noqa: NPY002
-    torch.set_rng_state(state["torch"])
+    torch.set_rng_state(torch.from_numpy(state["torch"]))
+
+
+# Trees -------------------------------------------------------------------------------------------
+
+
+def _flat(tree: Mapping[str, Any], prefix: str = "") -> Tree:
+    """Return the leaves of a tree by the names on the way to each."""
+    flat: Tree = {}
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            flat |= _flat(value, f"{prefix}{name}{_BETWEEN_NAMES}")
+        else:
+            flat[prefix + name] = value
+    return flat
+
+
+def _nested(flat: Tree) -> Tree:
+    """Return the tree whose leaves these are; one without leaves is not there."""
+    tree: Tree = {}
+    for path, value in flat.items():
+        *parents, leaf = path.split(_BETWEEN_NAMES)
+        inner = tree
+        for parent in parents:
+            inner = inner.setdefault(parent, {})
+        inner[leaf] = value
+    return tree
+
+
+def _tensors(arrays: Tree) -> dict[str, torch.Tensor]:
+    return {name: torch.from_numpy(array) for name, array in arrays.items()}
+
+
+def _check_arrays(found: Tree, wanted: Tree) -> None:
+    """Refuse what has not all of the wanted leaves, or another kind of array where one is wanted.
+
+    Raises:
+        ValueError: with the name, what was found and what was wanted.
+    """
+    for name, like in wanted.items():
+        if name not in found or _kind(found[name]) != _kind(like):
+            has = _kind(found[name]) if name in found else "nothing"
+            raise ValueError(f"{name}: found {has}; wanted {_kind(like)}")
+
+
+def _check_moments(
+    moments: Mapping[int, dict[str, torch.Tensor]], parameters: list[torch.Tensor]
+) -> None:
+    """Refuse what Adam cannot have found for these parameters."""
+    for number, found in moments.items():
+        shape = parameters[number].shape
+        wanted = {"step": torch.Size(), "exp_avg": shape, "exp_avg_sq": shape}
+        shapes = {name: tensor.shape for name, tensor in found.items()}
+        if shapes != wanted:
+            raise ValueError(f"optimizer/{number}: found {shapes}; wanted {wanted}")
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"an array {value.dtype}{list(value.shape)}"
+    return "numbers or text"

@@ -2,31 +2,64 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    Strict,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from roller_env.config import make_config
+from roller_env.config import MAX_ENVS, make_config
+from roller_env.envs.spaces import action_space, observation_space
 from roller_env.game.rewards import RewardWeights
-from roller_env.problems import Problem, listed
+from roller_env.problems import FieldPath, Problem, ProblemsError, listed, quoted
+from roller_env.training.files import RunError, read_whole
+from roller_env.yaml_tree import MAX_BYTES, MAX_DEPTH, Node, YamlError, read_tree, read_value
 
+MAX_STEPS: Final = 10**12
+_LONG: Final = 64
+MAX_ROLLOUT: Final = 10**8
+"""Samples of a rollout: they are in memory, some hundred bytes each."""
+
+
+def _whole(value: object) -> object:
+    """Return 1e6 as the whole number that it is; YAML's exponents are of floats."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def _printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("must be text that can be printed")
+    return text
+
+
+WholeNumber = Annotated[int, BeforeValidator(_whole)]
+Count = Annotated[WholeNumber, Field(gt=0, le=10**6)]
 Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
-PositiveInt = Annotated[int, Field(gt=0)]
 PositiveFloat = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegativeFloat = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Name = Annotated[str, Field(min_length=1, max_length=1_000), AfterValidator(_printable)]
 
 
-class ConfigError(ValueError):
-    """A training configuration that cannot be used; the message has one line a fault."""
+class ConfigError(ProblemsError):
+    """A training configuration that cannot be used; all its faults, each with its place."""
 
 
 class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
 
 class PPOConfig(_Frozen):
@@ -49,9 +82,9 @@ class PPOConfig(_Frozen):
         activation: between the layers.
     """
 
-    rollout_steps: PositiveInt = 128
-    batch_size: PositiveInt = 8192
-    epochs: PositiveInt = 4
+    rollout_steps: Count = 128
+    batch_size: Annotated[WholeNumber, Field(gt=0, le=MAX_ROLLOUT)] = 8192
+    epochs: Count = 4
     learning_rate: PositiveFloat = 1e-3
     learning_rate_decay: Literal["constant", "linear"] = "linear"
     gamma: Fraction = 0.99
@@ -61,7 +94,11 @@ class PPOConfig(_Frozen):
     value_coefficient: NonNegativeFloat = 0.5
     max_grad_norm: PositiveFloat = 0.5
     target_kl: PositiveFloat | None = None
-    hidden_sizes: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (64, 64)
+    hidden_sizes: Annotated[
+        tuple[Annotated[WholeNumber, Field(gt=0, le=2**14)], ...],
+        Strict(False),  # a list will do
+        Field(min_length=1, max_length=16),
+    ] = (64, 64)
     activation: Literal["tanh", "relu", "elu"] = "tanh"
 
 
@@ -76,8 +113,8 @@ class CloningConfig(_Frozen):
         held_out_share: of the episodes, not learnt from; one at least.
     """
 
-    epochs: PositiveInt = 50
-    batch_size: PositiveInt = 256
+    epochs: Count = 50
+    batch_size: Count = 256
     learning_rate: PositiveFloat = 1e-3
     held_out_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
 
@@ -111,28 +148,40 @@ class TrainingConfig(_Frozen):
         ppo: what the algorithm is told.
     """
 
-    level: str
+    level: Name
     environment: Mapping[str, Any] = Field(default_factory=dict)
     algorithm: Literal["ppo"] = "ppo"
-    seed: Annotated[int, Field(ge=0, lt=2**31)] = 0
-    num_envs: PositiveInt = 256
+    seed: Annotated[WholeNumber, Field(ge=0, lt=2**31)] = 0
+    num_envs: Annotated[WholeNumber, Field(gt=0, le=MAX_ENVS)] = 256
     practice_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    total_steps: PositiveInt = 4_000_000
+    total_steps: Annotated[WholeNumber, Field(gt=0, le=MAX_STEPS)] = 4_000_000
     wall_clock_budget_s: PositiveFloat | None = None
     checkpoint_interval_s: NonNegativeFloat = 30.0
     normalise_observations: bool = True
     normalise_rewards: bool = True
-    torch_threads: PositiveInt = 1
-    evaluation_episodes: Annotated[int, Field(ge=2)] = 100
+    torch_threads: Annotated[WholeNumber, Field(gt=0, le=1024)] = 1
+    evaluation_episodes: Annotated[WholeNumber, Field(ge=2, le=10**6)] = 100
     evaluation_environment: Mapping[str, Any] = Field(default_factory=dict)
     evaluation_replays: bool = False
-    demonstrations: str | None = None
+    demonstrations: Name | None = None
     cloning: CloningConfig = CloningConfig()
     ppo: PPOConfig = PPOConfig()
 
     @model_validator(mode="after")
     def _batches_fill_the_rollout(self) -> TrainingConfig:
         samples = self.num_envs * self.ppo.rollout_steps
+        if samples > MAX_ROLLOUT:
+            raise PydanticCustomError(
+                "large_rollout",
+                "num_envs {envs} * ppo.rollout_steps {steps} are {samples} samples of a rollout; "
+                "allowed are at most {most}",
+                {
+                    "envs": self.num_envs,
+                    "steps": self.ppo.rollout_steps,
+                    "samples": samples,
+                    "most": MAX_ROLLOUT,
+                },
+            )
         if samples % self.ppo.batch_size:
             raise PydanticCustomError(
                 "uneven_batches",
@@ -151,12 +200,28 @@ class TrainingConfig(_Frozen):
     @classmethod
     def _environment_takes_these(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
         if "level" in options:
-            raise ValueError("level is a field of the training itself; remove it here")
+            raise ValueError("level: is a field of the training itself; remove it here")
         try:
             make_config(**_with_weights(options))
         except TypeError as error:  # an unknown option, which pydantic would let through
             raise ValueError(str(error)) from None
         return options
+
+    @model_validator(mode="after")
+    def _the_agent_fits_into_its_evaluation(self) -> TrainingConfig:
+        trained, judged = (
+            make_config(level=self.level, **options)
+            for options in (self.environment_options, self.evaluation_options)
+        )
+        for space in (observation_space, action_space):
+            if space(trained) != space(judged):
+                name = space.__name__.replace("_space", "")
+                message = (
+                    "evaluation_environment: an agent can be judged only with the observations "
+                    "and actions it was trained with; remove {name}, or train with it"
+                )
+                raise PydanticCustomError("other_spaces", message, {"name": name})
+        return self
 
     @property
     def environment_options(self) -> dict[str, Any]:
@@ -175,7 +240,7 @@ class TrainingConfig(_Frozen):
 
     def to_yaml(self) -> str:
         """Return the text that `load_config` reads back as an equal configuration."""
-        return yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False)
+        return yaml.dump(self.model_dump(mode="json"), Dumper=_Dumper, sort_keys=False)
 
     def differences(self, other: TrainingConfig) -> list[str]:
         """Return ``field: mine, theirs`` for every field in which the two differ."""
@@ -187,7 +252,19 @@ class TrainingConfig(_Frozen):
         ]
 
 
-def load_config(file: Path, overrides: Sequence[str] = ()) -> TrainingConfig:
+class _Dumper(yaml.SafeDumper):
+    """Quotes what YAML 1.2 takes for a number and PyYAML's 1.1 does not, such as ``1e3``."""
+
+
+def _text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    style = '"' if text[:1] in "+-.0123456789" else None
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_Dumper.add_representer(str, _text)
+
+
+def load_config(file: str | os.PathLike[str], overrides: Sequence[str] = ()) -> TrainingConfig:
     """Read a configuration.
 
     Args:
@@ -198,21 +275,83 @@ def load_config(file: Path, overrides: Sequence[str] = ()) -> TrainingConfig:
     Raises:
         ConfigError: unreadable, unknown field, or a value that is not allowed; says where.
     """
+    path = Path(file)
     try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{file}: {error.strerror}") from error
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ConfigError(f"{file}: not YAML: {error}") from error
-    if not isinstance(content, dict):
-        raise ConfigError(f"{file}: expected fields such as 'level: classic', found {content!r}")
-    for override in overrides:
-        _override(content, override)
+        root = read_tree(_content(path), str(path))
+        source = _Source(root, str(path))
+        for override in overrides:
+            source.override(override)
+    except YamlError as error:
+        raise ConfigError(error.problems) from None
     try:
-        return TrainingConfig.model_validate(content)
+        return TrainingConfig.model_validate(source.content)
     except ValidationError as error:
-        problems = [str(_problem(details, file)) for details in error.errors()]
-        raise ConfigError("\n".join(problems)) from error
+        problems = [_problem(details, source) for details in error.errors(include_url=False)]
+        raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)) from None
+
+
+class _Source:
+    """What a configuration is read from: a file, and what is said instead on the command line.
+
+    Attributes:
+        content: plain data, mappings and lists and scalars.
+    """
+
+    def __init__(self, root: Node, filename: str) -> None:
+        content = root.plain()
+        assert isinstance(content, dict)
+        self.content: dict[str, Any] = content
+        self._root, self._filename = root, filename
+        self._overrides: dict[FieldPath, str] = {}
+
+    def override(self, override: str) -> None:
+        """Put a value where ``field=value`` says.
+
+        Raises:
+            ConfigError: it says no such thing, or the field is inside of what has no fields.
+            YamlError: the value is no YAML.
+        """
+        name, equals, value = override.partition("=")
+        place = f"--set {quoted(override)}"
+        *parents, leaf = name.split(".")
+        if not equals or not all((*parents, leaf)) or len(parents) > MAX_DEPTH:
+            message = "expected field=value, such as ppo.gamma=0.995"
+            raise ConfigError([Problem((), message, place)])
+        inner = self.content
+        for parent in parents:
+            inner = inner.setdefault(parent, {})
+            if not isinstance(inner, dict):
+                message = f"{quoted(parent)} has no fields of its own"
+                raise ConfigError([Problem((), message, place)])
+        inner[leaf] = read_value(value, place).plain()
+        self._overrides[*parents, leaf] = place
+
+    def where(self, path: FieldPath, *, of_key: bool) -> dict[str, Any]:
+        """Return filename, line and column of a field for a `Problem`."""
+        for length in range(len(path), 0, -1):
+            if place := self._overrides.get(path[:length]):
+                return {"filename": place}
+        line, column = self._root.position(path, of_key=of_key)
+        return {"filename": self._filename, "line": line, "column": column}
+
+
+def _content(file: Path) -> str:
+    """Return a file's text.
+
+    Raises:
+        ConfigError: there is none, or it is no text.
+    """
+    if not file.exists():
+        known = tuple(other.name for other in file.parent.glob("*.yaml"))
+        message = "there is no such file"
+        raise ConfigError([Problem((), message, str(file), written=file.name, known=known)])
+    try:
+        return read_whole(file, MAX_BYTES).decode("utf-8-sig")
+    except RunError as error:
+        raise ConfigError([Problem((), str(error))]) from None
+    except UnicodeDecodeError as error:
+        message = f"found the byte 0x{error.object[error.start]:02x}, which is not UTF-8"
+        raise ConfigError([Problem((), message, str(file))]) from None
 
 
 def _with_weights(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -230,35 +369,35 @@ def _with_weights(options: Mapping[str, Any]) -> dict[str, Any]:
     return {**options, "reward_weights": RewardWeights(**weights)}
 
 
-def _override(content: dict[str, Any], override: str) -> None:
-    name, equals, value = override.partition("=")
-    if not equals or not name:
-        raise ConfigError(f"{override!r}: expected field=value, such as ppo.gamma=0.995")
-    *parents, leaf = name.split(".")
-    for parent in parents:
-        inner = content.setdefault(parent, {})
-        if not isinstance(inner, dict):
-            raise ConfigError(f"{override!r}: {parent!r} has no fields of its own")
-        content = inner
-    try:
-        content[leaf] = yaml.safe_load(value)
-    except yaml.YAMLError as error:
-        raise ConfigError(f"{override!r}: the value is not YAML: {error}") from error
-
-
-def _problem(details: ErrorDetails, file: Path) -> Problem:
-    path, message = details["loc"], details["msg"]
+def _problem(details: ErrorDetails, source: _Source) -> Problem:
+    path, message, found = details["loc"], details["msg"], details["input"]
     if details["type"] == "extra_forbidden":
         models: dict[tuple[Any, ...], type[BaseModel]] = {
             ("ppo",): PPOConfig,
             ("cloning",): CloningConfig,
         }
-        known = tuple(models.get(path[:-1], TrainingConfig).model_fields)
-        message = f"unknown field; known are {listed(known)}"
-        return Problem(path, message, str(file), written=str(path[-1]), known=known)
-    if path and not isinstance(details["input"], dict):
-        message = f"{message}; found {details['input']!r}"
-    return Problem(path, message, str(file))
+        written, known = str(path[-1]), tuple(models.get(path[:-1], TrainingConfig).model_fields)
+        message, where = (
+            f"unknown field; known are {listed(known)}",
+            source.where(path, of_key=True),
+        )
+        return Problem(path, message, **where, written=written, known=known)
+    if details["type"] == "value_error":
+        message = str(details["ctx"]["error"])
+        # An option of the environment, whose message begins with its name.
+        option, colon, _ = message.partition(":")
+        if isinstance(found, dict) and colon and option in found:
+            path, message = (*path, option), message.removeprefix(f"{option}: ")
+    elif path and not isinstance(found, dict):
+        message = f"{message}; found {_short(found)}"
+        if isinstance(found, str) and found.replace("_", "").isdecimal() and "_" in found:
+            message += " (write it without '_')"
+    return Problem(path, message, **source.where(path, of_key=False))
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= _LONG else f"{text[:_LONG]}..."
 
 
 def _flat(fields: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

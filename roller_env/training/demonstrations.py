@@ -17,12 +17,13 @@ from roller_env.envs.spaces import action_space, observation_space
 from roller_env.game.actions import ActionMode, forces
 from roller_env.game.rewards import RewardWeights
 from roller_env.level import load_level
+from roller_env.problems import shown
 from roller_env.replay import Replay, ReplayError, load_replay
 from roller_env.replay.experience import Experience, actions_of, experiences
 from roller_env.replay.file import SUFFIX
 from roller_env.replay.scripted import PLAYER, meant
 from roller_env.training.config import TrainingConfig
-from roller_env.training.policy import Observations
+from roller_env.training.normalisation import Observations
 
 
 class DemonstrationError(ValueError):
@@ -78,13 +79,13 @@ def load_demonstrations(source: str, config: TrainingConfig) -> list[Demonstrati
             files = [path] if path.is_file() else sorted(path.glob(f"*{SUFFIX}"))
             episodes = _from_replays([load_replay(file) for file in files], wanted)
         else:
-            episodes = _from_minari(_data_set(source), wanted)
+            episodes = _from_data_set(source, wanted)
     except ReplayError as error:
-        raise DemonstrationError(f"{source}: {error}") from None
+        raise DemonstrationError(f"{shown(source)}: {error}") from None
     if len(episodes) < 2:
         raise DemonstrationError(
-            f"{source}: found {len(episodes)} episode; needed are two or more, since some are held "
-            "out to see what was learnt"
+            f"{shown(source)}: found {len(episodes)} episode; needed are two or more, since some "
+            "are held out to see what was learnt"
         )
     return episodes
 
@@ -137,7 +138,7 @@ def _data_set(source: str) -> Any:
         import minari
     except ImportError:
         raise DemonstrationError(
-            f"{source}: no such replay or directory of replays; for Minari's data sets, "
+            f"{shown(source)}: no such replay or directory of replays; for Minari's data sets, "
             "pip install 'roller-env[demos]'"
         ) from None
     try:
@@ -145,8 +146,21 @@ def _data_set(source: str) -> Any:
             return minari.MinariDataset(Path(source) / "data")
         return minari.load_dataset(source, download=False)
     except (FileNotFoundError, ValueError) as error:
+        # None that can be found, or no name that one could have.
         raise DemonstrationError(
-            f"{source}: no replay, directory of replays or Minari data set: {error}"
+            f"{shown(source)}: no replay, directory of replays or Minari data set: {error}"
+        ) from None
+
+
+def _from_data_set(source: str, wanted: EnvConfig) -> list[Demonstration]:
+    """Read a Minari data set, whose files (JSON and HDF5) may hold anything at all."""
+    try:
+        return _from_minari(_data_set(source), wanted)
+    except DemonstrationError:
+        raise
+    except (LookupError, MemoryError, OSError, TypeError, ValueError) as error:
+        raise DemonstrationError(
+            f"{shown(source)}: not a whole Minari data set: {type(error).__name__}: {error}"
         ) from None
 
 

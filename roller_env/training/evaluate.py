@@ -15,11 +15,14 @@ from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.game.actions import forces
 from roller_env.level.expand import coin_positions
 from roller_env.level.schema import Level
+from roller_env.training.files import RunError
 from roller_env.training.policy import Policy
 
 CONFIDENCE: Final = 0.95
 MAX_ROWS: Final = 256
 """Episodes played together; more are played one after another in the same rows."""
+
+MAX_EPISODES: Final = 1_000_000
 
 _RESAMPLES: Final = 10_000
 _BOOTSTRAP_SEED: Final = 0
@@ -155,7 +158,13 @@ def evaluate(
 
 
 def rows_and_repeats(episodes: int) -> tuple[int, int]:
-    """Return how many rows play how many episodes each, for at least `episodes` in all."""
+    """Return how many rows play how many episodes each, for at least `episodes` in all.
+
+    Raises:
+        RunError: it is none, or too many.
+    """
+    if not 1 <= episodes <= MAX_EPISODES:
+        raise RunError(f"episodes: found {episodes}; must be 1 to {MAX_EPISODES}")
     repeats = math.ceil(episodes / MAX_ROWS)
     return math.ceil(episodes / repeats), repeats
 

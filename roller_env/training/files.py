@@ -5,9 +5,15 @@ from __future__ import annotations
 import fcntl
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
+
+from roller_env.problems import quoted, shown
+
+MAX_NAME_BYTES: Final = 150
+"""Of a run's name; the agent's replays carry it with them."""
 
 
 class RunError(RuntimeError):
@@ -36,11 +42,21 @@ class RunFiles:
 
     @property
     def policy(self) -> Path:
-        """The trained agent, as Stable-Baselines3 saves it."""
+        """What the trained agent is; see `roller_env.training.policy`."""
+        return self.directory / "policy.json"
+
+    @property
+    def weights(self) -> Path:
+        """The trained agent's weights."""
+        return self.directory / "policy.safetensors"
+
+    @property
+    def sb3_policy(self) -> Path:
+        """The trained agent as Stable-Baselines3 saves it, for use there."""
         return self.directory / "policy.zip"
 
     @property
-    def normaliser(self) -> Path:
+    def sb3_normaliser(self) -> Path:
         """Statistics of the observations, as Stable-Baselines3's VecNormalize saves them."""
         return self.directory / "vecnormalize.pkl"
 
@@ -89,6 +105,32 @@ class RunFiles:
         """What ran, on what, for how long; written last: a run that has it is finished."""
         return self.directory / "run.json"
 
+    @property
+    def has_begun(self) -> bool:
+        """Whether there is something of a training that another could destroy."""
+        kept = (self.checkpoint, self.policy, self.sb3_policy, self.summary)
+        return any(file.exists() for file in kept) or (
+            self.progress.exists() and self.progress.stat().st_size > 0
+        )
+
+
+def read_whole(file: Path, max_bytes: int) -> bytes:
+    """Return a file's content; what is no plain file is not opened, since a pipe never ends.
+
+    Raises:
+        RunError: there is no such file, or it cannot be read, or is larger than allowed.
+    """
+    if not file.is_file():
+        raise RunError(f"{shown(file)}: {'not a file' if file.exists() else 'there is none'}")
+    try:
+        with file.open("rb") as stream:
+            content = stream.read(max_bytes + 1)
+    except OSError as error:
+        raise RunError(f"{shown(file)}: {error.strerror}") from None
+    if len(content) > max_bytes:
+        raise RunError(f"{shown(file)}: too large; allowed are at most {max_bytes} bytes")
+    return content
+
 
 def write_atomically(file: Path, content: bytes | str) -> None:
     """Write a file so that, whenever the process dies, it holds the old content or the new.
@@ -100,17 +142,44 @@ def write_atomically(file: Path, content: bytes | str) -> None:
     """
     data = content.encode() if isinstance(content, str) else content
     temporary = file.with_name(file.name + ".tmp")
-    with temporary.open("wb") as stream:
-        stream.write(data)
-        stream.flush()
-        os.fsync(stream.fileno())
-    temporary.replace(file)
-    # The new name is in the directory, which reaches the disk in its own time unless told.
-    descriptor = os.open(file.parent, os.O_RDONLY)
     try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        # Not written through: it may be the half copy of a dead process, or a link to elsewhere.
+        temporary.unlink(missing_ok=True)
+        with temporary.open("xb") as stream:
+            stream.write(data)
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.replace(file)
+        # The new name is in the directory, which reaches the disk in its own time unless told.
+        descriptor = os.open(file.parent, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+    except OSError as error:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+        # A write that fails does not say itself in which file.
+        raise OSError(error.errno, error.strerror, str(file)) from error
+
+
+def run_directory(runs: Path, name: str) -> Path:
+    """Return the directory of a run.
+
+    Args:
+        runs: directory of all runs.
+        name: the run's; one name, not a way to somewhere else.
+
+    Raises:
+        RunError: no file can be called that, or it would be outside ``runs``.
+    """
+    is_one_name = name != "" and Path(name).name == name and not name.startswith(".")
+    if not (is_one_name and name.isprintable() and len(os.fsencode(name)) <= MAX_NAME_BYTES):
+        raise RunError(
+            f"name: found {quoted(name)}; must be a name for a directory inside {shown(runs)}: "
+            f"at most {MAX_NAME_BYTES} bytes that can be printed, no '/', no '.' at the beginning"
+        )
+    return runs / name
 
 
 @contextmanager
@@ -121,10 +190,12 @@ def only_one_process(directory: Path) -> Iterator[None]:
         RunError: another process is training this run.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    with (directory / ".lock").open("w") as lock:
+    with (directory / ".lock").open("a") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
-            message = f"{directory} is being trained by another process; choose another --name"
+            message = (
+                f"{shown(directory)} is being trained by another process; choose another --name"
+            )
             raise RunError(message) from error
         yield

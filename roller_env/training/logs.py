@@ -15,7 +15,10 @@ from typing import Any, Final
 from stable_baselines3.common.logger import KVWriter, TensorBoardOutputFormat
 from torch.utils.tensorboard.writer import SummaryWriter
 
-from roller_env.training.files import write_atomically
+from roller_env.problems import shown
+from roller_env.training.files import RunError, read_whole, write_atomically
+
+MAX_BYTES: Final = 2**30
 
 STEPS: Final = "time/total_timesteps"
 """The column by which rows are ordered; Stable-Baselines3's name for it."""
@@ -95,11 +98,23 @@ def read_progress(file: Path) -> list[dict[str, str]]:
     """Return the complete rows of a progress file, none if there is no file.
 
     A last row that a dying process did not finish is left out.
+
+    Raises:
+        RunError: what is there is no progress file.
     """
     if not file.exists():
         return []
-    text = file.read_text(encoding="utf-8")
-    return list(csv.DictReader(io.StringIO(text[: text.rfind("\n") + 1])))
+    try:
+        text = read_whole(file, MAX_BYTES).decode("utf-8")
+        reader = csv.DictReader(io.StringIO(text[: text.rfind("\n") + 1]))
+        rows = list(reader)
+        if reader.fieldnames is not None and STEPS not in reader.fieldnames:
+            raise LookupError(STEPS)
+        _ = [int(row[STEPS]) for row in rows]
+    except (csv.Error, LookupError, TypeError, ValueError):
+        message = f"{shown(file)}: not a training's progress; move it away to write it anew"
+        raise RunError(message) from None
+    return rows
 
 
 def _is_nan(value: Any) -> bool:

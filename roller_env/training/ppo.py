@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import torch
@@ -21,13 +21,8 @@ from roller_env.training.config import TrainingConfig
 from roller_env.training.display import ProgressDisplay
 from roller_env.training.files import RunFiles
 from roller_env.training.logs import STEPS, ContinuingCSV, ContinuingTensorBoard
+from roller_env.training.network import network_class, network_options
 from roller_env.training.practice import FROM_START, PracticeStarts
-
-_ACTIVATIONS: Final[dict[str, type[torch.nn.Module]]] = {
-    "tanh": torch.nn.Tanh,
-    "relu": torch.nn.ReLU,
-    "elu": torch.nn.ELU,
-}
 
 
 def learn(config: TrainingConfig, files: RunFiles) -> tuple[PPO, Progress]:
@@ -46,11 +41,11 @@ def learn(config: TrainingConfig, files: RunFiles) -> tuple[PPO, Progress]:
     # what is not a number is refused when actions are drawn.
     torch.distributions.Distribution.set_default_validate_args(False)
     environments = make_environments(config)
+    model, progress = new_model(config, environments), Progress()
     if files.checkpoint.exists():
         checkpoint = load_checkpoint(files.checkpoint)
-        model, progress = checkpoint.restore(environments), checkpoint.progress
-    else:
-        model, progress = new_model(config, environments), Progress()
+        checkpoint.restore(model)
+        progress = checkpoint.progress
     if is_complete(config, progress):
         return model, progress
     outputs = [
@@ -100,9 +95,8 @@ def new_model(config: TrainingConfig, environments: PracticeStarts) -> PPO:
     )
     ppo = config.ppo
     end = 0.0 if ppo.learning_rate_decay == "linear" else ppo.learning_rate
-    policy = "MultiInputPolicy" if config.environment.get("observation") == "dict" else "MlpPolicy"
     return PPO(
-        policy,
+        network_class(config),
         normaliser,
         learning_rate=LinearSchedule(ppo.learning_rate, end, end_fraction=1.0),
         n_steps=ppo.rollout_steps,
@@ -115,10 +109,7 @@ def new_model(config: TrainingConfig, environments: PracticeStarts) -> PPO:
         vf_coef=ppo.value_coefficient,
         max_grad_norm=ppo.max_grad_norm,
         target_kl=ppo.target_kl,
-        policy_kwargs={
-            "net_arch": list(ppo.hidden_sizes),
-            "activation_fn": _ACTIVATIONS[ppo.activation],
-        },
+        policy_kwargs=network_options(config),
         seed=config.seed,
         device="cpu",
     )

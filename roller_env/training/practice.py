@@ -105,7 +105,7 @@ class PracticeStarts(VecEnvWrapper):
             games = self._games[waypoints[int(self._rng.integers(len(waypoints)))]]
             chosen.append(games[int(self._rng.integers(len(games)))])
         own = simulation.snapshot(rows).generators
-        simulation.restore(replace(_joined(chosen), generators=own), rows)
+        simulation.restore(replace(joined(chosen), generators=own), rows)
         fresh = shape_observation(simulation.config, simulation.observe(rows))
         if isinstance(observations, dict):
             for name, values in observations.items():
@@ -116,7 +116,7 @@ class PracticeStarts(VecEnvWrapper):
         self._from_start[rows] = False
 
     def snapshot(self) -> PracticeSnapshot:
-        """Return the state of all rows and what was kept; it can be pickled."""
+        """Return the state of all rows and what was kept; as copies."""
         return PracticeSnapshot(
             environments=self.environments.get_state(),
             games={waypoint: list(games) for waypoint, games in self._games.items()},
@@ -134,7 +134,7 @@ class PracticeStarts(VecEnvWrapper):
         self._rng.bit_generator.state = snapshot.generator
 
 
-def _joined(games: Sequence[Snapshot]) -> Snapshot:
+def joined(games: Sequence[Snapshot]) -> Snapshot:
     """Return snapshots of one row each as one of many rows."""
     return replace(
         games[0],
@@ -143,3 +143,17 @@ def _joined(games: Sequence[Snapshot]) -> Snapshot:
         level_of_row=np.concatenate([game.level_of_row for game in games]),
         generators=tuple(generator for game in games for generator in game.generators),
     )
+
+
+def separate(games: Snapshot) -> list[Snapshot]:
+    """Return a snapshot of many rows as snapshots of one row each."""
+    return [
+        replace(
+            games,
+            physics=games.physics[row : row + 1],
+            game={name: values[row : row + 1] for name, values in games.game.items()},
+            level_of_row=games.level_of_row[row : row + 1],
+            generators=games.generators[row : row + 1],
+        )
+        for row in range(len(games.generators))
+    ]

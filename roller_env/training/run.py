@@ -6,19 +6,29 @@ import json
 import os
 import platform
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
+from pydantic_core import from_json
+
 from roller_env import __version__
 from roller_env.envs.sb3 import RollerVecEnv
+from roller_env.problems import shown
 from roller_env.training.behaviour_cloning import start_from_demonstrations
-from roller_env.training.checkpoint import Progress
+from roller_env.training.checkpoint import CheckpointError, Progress, load_checkpoint
 from roller_env.training.config import TrainingConfig, load_config
-from roller_env.training.demonstrations import load_demonstrations
+from roller_env.training.demonstrations import Demonstration, load_demonstrations
 from roller_env.training.evaluate import Evaluation, evaluate, rows_and_repeats
-from roller_env.training.files import RunError, RunFiles, only_one_process, write_atomically
+from roller_env.training.files import (
+    RunError,
+    RunFiles,
+    only_one_process,
+    read_whole,
+    write_atomically,
+)
 from roller_env.training.pictures import draw_paths, record_video
 from roller_env.training.policy import Policy, load_policy, save_policy
 from roller_env.training.ppo import learn
@@ -27,6 +37,8 @@ from roller_env.training.report import draw_learning_curve, markdown_table, writ
 
 EVALUATION_SEED_OFFSET: Final = 1_000_000
 """Added to a training's seed, so that an agent is judged on starts it was not trained on."""
+
+MAX_SUMMARY_BYTES: Final = 2**24
 
 _PACKAGES: Final = ("mujoco", "gymnasium", "stable-baselines3", "torch", "numpy")
 
@@ -58,38 +70,65 @@ def train(config: TrainingConfig, directory: Path, *, resume: bool = False) -> T
 
     Raises:
         RunError: the directory holds another run, one that was not to be resumed, or one that
-            another process is training.
+            another process is training; or the disk is full or cannot be written to.
         CheckpointError: the checkpoint is damaged.
         DemonstrationError: the demonstrations cannot be used.
+        LevelError: the level cannot be used.
     """
     files = RunFiles(directory)
-    with only_one_process(directory):
-        # Read first: a run is not to be begun with what cannot be learnt from.
-        demonstrations = (
-            load_demonstrations(config.demonstrations, config)
-            if config.demonstrations is not None and not files.checkpoint.exists()
-            else None
-        )
-        _claim(config, files, resume)
-        if files.summary.exists():
-            return TrainingRun(files, json.loads(files.summary.read_text()), was_finished=True)
-        if demonstrations is not None:
-            print(start_from_demonstrations(config, demonstrations, files), flush=True)
-        model, progress = learn(config, files)
-        save_policy(model, files)
-        start_s = time.monotonic()
-        policy = load_policy(directory)
-        evaluation = evaluate_policy(policy, config, config.evaluation_episodes)
-        write_evaluation(evaluation, config, files)
-        print(markdown_table(evaluation, config), flush=True)
-        draw_learning_curve(config, evaluation.coins_in_level, files)
-        draw_paths(evaluation, files.paths)
-        record_video(policy, config, evaluation.seed, files.video)
-        if config.evaluation_replays:
-            save_replays(evaluation, config, directory / "replays", f"policy {directory.name}")
-        summary = _summary(config, progress, time.monotonic() - start_s)
-        write_atomically(files.summary, json.dumps(summary, indent=2) + "\n")
-        return TrainingRun(files, summary, was_finished=False)
+    # All that can be wrong with what is asked for shows now, before there is a directory for it.
+    demonstrations = None
+    if not (files.checkpoint.exists() or files.summary.exists()):
+        check_playable(config)
+        if config.demonstrations is not None:
+            demonstrations = load_demonstrations(config.demonstrations, config)
+    try:
+        with only_one_process(directory):
+            return _train(config, files, demonstrations, resume)
+    except OSError as error:
+        raise RunError(_unwritable(error, files)) from error
+    except MemoryError as error:
+        raise RunError(f"this machine's memory is too small for this training: {error}") from error
+
+
+def check_playable(config: TrainingConfig) -> None:
+    """Make the environments of training and evaluation once, with one row, and close them.
+
+    Raises:
+        LevelError: the level cannot be used.
+        ValueError: an option cannot.
+    """
+    for options in (config.environment_options, config.evaluation_options):
+        RollerVecEnv(config.level, 1, **options).close()
+
+
+def _train(
+    config: TrainingConfig,
+    files: RunFiles,
+    demonstrations: Sequence[Demonstration] | None,
+    resume: bool,
+) -> TrainingRun:
+    _claim(config, files, resume)
+    if files.summary.exists():
+        return TrainingRun(files, _read_summary(files.summary), was_finished=True)
+    if demonstrations is not None:
+        print(start_from_demonstrations(config, demonstrations, files), flush=True)
+    model, progress = learn(config, files)
+    save_policy(model, config, files)
+    start_s = time.monotonic()
+    policy = load_policy(files.directory)
+    evaluation = evaluate_policy(policy, config, config.evaluation_episodes)
+    write_evaluation(evaluation, config, files)
+    print(markdown_table(evaluation, config), flush=True)
+    draw_learning_curve(config, evaluation.coins_in_level, files)
+    draw_paths(evaluation, files.paths)
+    record_video(policy, config, evaluation.seed, files.video)
+    if config.evaluation_replays:
+        player = f"policy {files.directory.name}"
+        save_replays(evaluation, config, files.directory / "replays", player)
+    summary = _summary(config, progress, time.monotonic() - start_s)
+    write_atomically(files.summary, json.dumps(summary, indent=2) + "\n")
+    return TrainingRun(files, summary, was_finished=False)
 
 
 def evaluate_policy(
@@ -114,19 +153,45 @@ def evaluate_policy(
 
 def _claim(config: TrainingConfig, files: RunFiles, resume: bool) -> None:
     """Make the directory this configuration's, or refuse."""
-    if not files.config.exists():
+    if not (files.config.exists() and files.has_begun):
+        # What a start that failed has left behind is in nobody's way.
         write_atomically(files.config, config.to_yaml())
         return
+    name = shown(files.directory)
     if not resume:
-        message = f"{files.directory} exists; --resume goes on with it, --name starts another"
-        raise RunError(message)
+        raise RunError(f"{name} exists; --resume goes on with it, --name starts another")
     differences = load_config(files.config).differences(config)
     if differences:
         raise RunError(
-            f"{files.directory} was started with another configuration (its value, yours):\n"
+            f"{name} was started with another configuration (its value, yours):\n"
             + "\n".join(f"  {difference}" for difference in differences)
             + "\nchoose another --name, or ask for what it was started with"
         )
+
+
+def _read_summary(file: Path) -> dict[str, Any]:
+    try:
+        summary = from_json(read_whole(file, MAX_SUMMARY_BYTES))
+    except ValueError as error:
+        message = f"{shown(file)}: damaged ({error}); remove it to have the run evaluated again"
+        raise RunError(message) from None
+    if not isinstance(summary, dict):
+        raise RunError(f"{shown(file)}: damaged; remove it to have the run evaluated again")
+    return summary
+
+
+def _unwritable(error: OSError, files: RunFiles) -> str:
+    """Return what failed, what is kept, and how to go on."""
+    fault = error.strerror or str(error)
+    where = shown(error.filename or files.directory)
+    try:
+        steps = load_checkpoint(files.checkpoint).progress.steps
+    except CheckpointError:
+        return f"{where}: {fault}; nothing was kept yet. When it can be written to, --resume begins"
+    return (
+        f"{where}: {fault}; kept is the training up to its checkpoint at {steps:,} steps. When it "
+        "can be written to, --resume goes on from there"
+    )
 
 
 def _summary(config: TrainingConfig, progress: Progress, rest_s: float) -> dict[str, Any]:

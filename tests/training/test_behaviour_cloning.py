@@ -22,7 +22,7 @@ from roller_env.training.behaviour_cloning import (
     start_from_demonstrations,
     weigh_statistics,
 )
-from roller_env.training.checkpoint import load_checkpoint
+from roller_env.training.checkpoint import Checkpoint, load_checkpoint
 from roller_env.training.config import CloningConfig, TrainingConfig
 from roller_env.training.demonstrations import Demonstration, load_demonstrations
 from roller_env.training.files import RunFiles
@@ -171,6 +171,13 @@ def test_rewards_that_are_not_known_leave_the_value_network_and_their_scale_alon
     assert normaliser_of(model).ret_rms.count < 1.0
 
 
+def weights(checkpoint: Checkpoint) -> dict[str, torch.Tensor]:
+    """Return the weights of a checkpoint's learner."""
+    model = new_model(checkpoint.config, make_environments(checkpoint.config))
+    checkpoint.restore(model)
+    return model.policy.state_dict()
+
+
 def test_a_training_goes_on_from_its_demonstrations_and_ends_the_same_if_it_was_stopped(
     directory: Path, tmp_path: Path
 ) -> None:
@@ -184,14 +191,13 @@ def test_a_training_goes_on_from_its_demonstrations_and_ends_the_same_if_it_was_
     assert cloning.accuracy > cloning.chance
     begun = load_checkpoint(files.checkpoint)
     assert begun.progress.steps == 0
-    cloned = begun.restore(make_environments(config)).policy.state_dict()
+    cloned = weights(begun)
     # Out of time after its first update.
     hurried = config.model_copy(update={"wall_clock_budget_s": begun.progress.wall_s + 1e-3})
     _, progress = learn(hurried, files)
     assert progress.steps == config.steps_per_update
     model, _ = learn(config, files)
-    final = load_checkpoint(whole.files.checkpoint).restore(make_environments(config))
-    for name, value in final.policy.state_dict().items():
+    for name, value in weights(load_checkpoint(whole.files.checkpoint)).items():
         assert torch.equal(model.policy.state_dict()[name], value), name
         assert not torch.equal(cloned[name], value), name
 

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import errno
+import hashlib
+import io
+import json
+import os
 import random
+import zipfile
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
+import safetensors.numpy
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
@@ -22,7 +32,7 @@ from roller_env.training.checkpoint import (
     save_checkpoint,
 )
 from roller_env.training.files import RunError, RunFiles, only_one_process, write_atomically
-from roller_env.training.ppo import learn, make_environments
+from roller_env.training.ppo import learn, make_environments, new_model
 from roller_env.training.practice import PracticeStarts
 from tests.training.small import UPDATES, small_config
 
@@ -36,7 +46,10 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> tuple[PPO, Checkpoint, 
 
 
 def restored(checkpoint: Checkpoint) -> PPO:
-    return checkpoint.restore(make_environments(checkpoint.config.model_copy(update={"seed": 9})))
+    config = checkpoint.config.model_copy(update={"seed": 9})
+    model = new_model(config, make_environments(config))
+    checkpoint.restore(model)
+    return model
 
 
 def normaliser(model: PPO) -> VecNormalize:
@@ -134,6 +147,111 @@ def test_a_checkpoint_with_any_byte_wrong_or_missing_is_refused(
     file.write_bytes(damaged)
     with pytest.raises(CheckpointError, match=r"checkpoint\.zip: (damaged|not a checkpoint)"):
         load_checkpoint(file)
+
+
+def packed(facts: Any, arrays: dict[str, npt.NDArray[Any]], compression: int = 0) -> bytes:
+    """Return the content of a checkpoint whose hash is right."""
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w", compression) as container:
+        container.writestr("state.json", facts if isinstance(facts, str) else json.dumps(facts))
+        container.writestr("arrays.safetensors", safetensors.numpy.save(arrays))
+    body = archive.getvalue()
+    return f"roller-checkpoint-2 sha256 {hashlib.sha256(body).hexdigest()}\n".encode() + body
+
+
+def unpacked(file: Path) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
+    with zipfile.ZipFile(io.BytesIO(file.read_bytes().split(b"\n", 1)[1])) as container:
+        facts = json.loads(container.read("state.json"))
+        return facts, safetensors.numpy.load(container.read("arrays.safetensors"))
+
+
+Edit = Callable[[dict[str, Any], dict[str, npt.NDArray[Any]]], object]
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda facts, arrays: arrays.pop("normaliser/returns"), "returns: found nothing"),
+        (
+            lambda facts, arrays: arrays.update({"normaliser/returns": np.zeros(1)}),
+            r"returns: found an array float64\[1\]; wanted an array float64\[8\]",
+        ),
+        (
+            lambda facts, arrays: arrays.update(
+                {"environments/games/game/waypoint": np.full(8, 10**9)}
+            ),
+            "waypoint: found .*; must be 0 to ",
+        ),
+        (
+            lambda facts, arrays: arrays.update(
+                {"environments/games/level_of_row": np.full(8, -1)}
+            ),
+            "level_of_row: found .*; must be 0 to 0",
+        ),
+        (
+            lambda facts, arrays: arrays.update({"optimizer/0/exp_avg": np.zeros(3, np.float32)}),
+            "optimizer/0: found ",
+        ),
+        (
+            lambda facts, arrays: facts["state"].update({"environments/games/generators": []}),
+            "generators: found 0; wanted 8",
+        ),
+        (
+            lambda facts, arrays: facts["state"].update({"environments/level": "{}"}),
+            "the level 'flat' has been changed",
+        ),
+        (
+            lambda facts, arrays: facts["state"].update({"random/python": [3, [1, 2], None]}),
+            "not of a training with this configuration",
+        ),
+        (lambda facts, arrays: facts["state"].pop("learner/steps"), "learner/steps: found nothing"),
+        (lambda facts, arrays: facts.update(config={}), "level: Field required|validation error"),
+        (lambda facts, arrays: facts.update(progress={"x": 1}), "damaged"),
+        (lambda facts, arrays: facts.update(state={"a": 1, "a/b": 2}), "damaged"),
+    ],
+)
+def test_a_checkpoint_that_does_not_fit_the_learner_is_refused(
+    trained: tuple[PPO, Checkpoint, Path], tmp_path: Path, edit: Edit, message: str
+) -> None:
+    facts, arrays = unpacked(trained[2])
+    file = tmp_path / "checkpoint.zip"
+    file.write_bytes(packed(facts, arrays))
+    restored(load_checkpoint(file))
+    edit(facts, arrays)
+    file.write_bytes(packed(facts, arrays))
+    with pytest.raises(CheckpointError, match=message):
+        restored(load_checkpoint(file))
+
+
+def test_nothing_is_unpacked_that_is_larger_than_its_file(tmp_path: Path) -> None:
+    file = tmp_path / "checkpoint.zip"
+    file.write_bytes(packed(" " * 10**7, {}, zipfile.ZIP_DEFLATED))
+    with pytest.raises(CheckpointError, match=r"state\.json is larger than the file"):
+        load_checkpoint(file)
+
+
+@pytest.mark.parametrize("text", ["[" * 10**5, "", "{", "7"])
+def test_a_state_that_is_no_state_is_refused(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "checkpoint.zip"
+    file.write_bytes(packed(text, {}))
+    with pytest.raises(CheckpointError, match="damaged"):
+        load_checkpoint(file)
+
+
+def test_a_write_that_fails_leaves_the_old_file_and_no_half_of_the_new(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "checkpoint.zip"
+    write_atomically(file, b"whole")
+
+    def full(descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match=r"No space left on device.*checkpoint\.zip"):
+        write_atomically(file, b"new")
+    assert [path.name for path in tmp_path.iterdir()] == ["checkpoint.zip"]
+    assert file.read_bytes() == b"whole"
 
 
 def test_a_half_written_file_never_takes_the_place_of_a_whole_one(tmp_path: Path) -> None:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import os
+import time
+from contextlib import suppress
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from roller_env.game.rewards import RewardWeights
 from roller_env.level import shipped_levels
 from roller_env.training.config import ConfigError, TrainingConfig, load_config
 from tests.training.small import small_config
 
+BOMB = "abcdefghijklmnopqrstuvwxyz"
 CONFIGS = sorted((Path(__file__).parents[2] / "configs").glob("*.yaml"))
 
 
@@ -81,11 +88,37 @@ def test_reward_weights_are_given_by_name() -> None:
         ("level: flat\nppo: {batch_size: 5000}", "ppo.batch_size 5000 does not divide the 32768"),
         ("level: flat\nenvironment: {rewrad: shaped}", "did you mean 'reward'?"),
         ("level: flat\nenvironment: {reward: shapely}", "did you mean 'shaped'?"),
-        ("level: flat\nenvironment: {level: gate}", "level is a field of the training itself"),
+        (
+            "level: flat\nenvironment: {level: gate}",
+            "environment.level: is a field of the training",
+        ),
         ("level: flat\nenvironment: {reward_weights: {coins: 1}}", "did you mean 'coin'?"),
         ("level: flat\nenvironment: {reward_weights: 3}", "reward_weights: expected any of 'coin'"),
-        ("level: [", "not YAML"),
-        ("- level", "expected fields such as 'level: classic'"),
+        ("level: flat\nenvironment: {reward: shapely}", "yaml:2:23: environment.reward: found"),
+        ("level: flat\nseed: 1\nseed: 2", "yaml:3:1: seed: given twice, first on line 2"),
+        ("level: flat\ntotal_steps: true", "2:14: total_steps: Input should be a valid integer"),
+        ("level: flat\ntotal_steps: 2_500", "found '2_500' (write it without '_')"),
+        (f"level: flat\nseed: {'1' * 5000}", "seed: Input should be a valid integer; found inf"),
+        (f"level: flat\nseed: {'1' * 39}", "seed: Input should be less than 2147483648"),
+        ("level: flat\nseed: 2026-11-26", "found '2026-11-26'"),
+        ("level: 2026-11-26\nseed: x", "seed: Input should be a valid integer"),
+        ("level: 7", "level: Input should be a valid string; found 7"),
+        ("level: flat\nnormalise_rewards: yes", "Input should be a valid boolean; found 'yes'"),
+        ("level: flat\nppo: {gamma: '0.9'}", "ppo.gamma: Input should be a valid number"),
+        ('level: "\\e[31mflat"', "level: must be text that can be printed"),
+        ("level: flat\nnum_envs: 1e18", "num_envs: Input should be less than or equal to 1000000"),
+        ("level: flat\nppo: {hidden_sizes: [4, 1000000000]}", "ppo.hidden_sizes[1]: Input should"),
+        (
+            "level: flat\nnum_envs: 1e6\nppo: {rollout_steps: 1e6}",
+            "1000000000000 samples of a rollout; allowed are at most 100000000",
+        ),
+        (
+            "level: flat\nevaluation_environment: {observation: rays}",
+            "an agent can be judged only with the observations",
+        ),
+        ("level: !!python/object/apply:os.system ['true']", "found the tag"),
+        ("level: [", "not valid YAML"),
+        ("- level", "found a list; wanted a mapping of fields"),
     ],
 )
 def test_a_mistake_is_told_with_its_place_and_what_would_be_right(
@@ -103,7 +136,12 @@ def test_a_mistake_is_told_with_its_place_and_what_would_be_right(
     [
         ("seed", "expected field=value"),
         ("seed.x=1", "'seed' has no fields of its own"),
-        ("seed=[", "the value is not YAML"),
+        ("seed=[", "not valid YAML"),
+        ("seed=true", "--set 'seed=true': seed: Input should be a valid integer; found True"),
+        ("seed=&a [*a]", "stands inside what it repeats"),
+        ("=1", "expected field=value"),
+        ("ppo..gamma=1", "expected field=value"),
+        (f"environment{'.physics' * 5000}=1", "expected field=value"),
         ("sed=1", "did you mean 'seed'?"),
     ],
 )
@@ -115,8 +153,87 @@ def test_a_mistake_in_an_override_is_told(tmp_path: Path, override: str, message
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"nowhere\.yaml: No such file"):
+    with pytest.raises(ConfigError, match=r"nowhere\.yaml: there is no such file"):
         load_config(tmp_path / "nowhere.yaml")
+    written(tmp_path, "level: flat")
+    with pytest.raises(ConfigError, match=r"did you mean 'training\.yaml'"):
+        load_config(tmp_path / "trainign.yaml")
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    file = tmp_path / "training.yaml"
+    os.mkfifo(file)
+    with pytest.raises(ConfigError, match=r"training\.yaml: not a file"):
+        load_config(file)
+
+
+def test_all_mistakes_are_told_at_once_each_with_its_place(tmp_path: Path) -> None:
+    file = written(tmp_path, "level: flat\nseed: -1\nppo:\n  gamma: 2\n  epoch: 3\nspeed: 1\n")
+    with pytest.raises(ConfigError) as caught:
+        load_config(file, ["num_envs=0"])
+    places = [(problem.field, problem.line, problem.column) for problem in caught.value.problems]
+    assert places == [
+        ("num_envs", None, None),
+        ("seed", 2, 7),
+        ("ppo.gamma", 4, 10),
+        ("ppo.epoch", 5, 3),
+        ("speed", 6, 1),
+    ]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a: &a [x, x]\n" + "".join(f"{b}: &{b} [*{a}, *{a}]\n" for a, b in pairwise(BOMB)),
+        "level: " + "[" * 900 + "]" * 900,
+        "level: " + "{a: " * 900 + "1" + "}" * 900,
+        "level: flat\n" + "# " + "x" * 2**21,
+    ],
+    ids=["aliases", "lists", "mappings", "length"],
+)
+def test_a_file_that_asks_for_endless_work_is_refused_at_once(tmp_path: Path, text: str) -> None:
+    file = written(tmp_path, text)
+    begin_s = time.process_time()
+    with pytest.raises(ConfigError):
+        load_config(file)
+    assert time.process_time() - begin_s < 5.0
+
+
+@given(name=st.text(st.characters(codec="utf-8").filter(str.isprintable), min_size=1))
+@example("1e3")
+@example("0x1F")
+@example("null")
+@example("~")
+@example("2026-11-26")
+@example("1_000")
+@example(".inf")
+@example("a: b # c")
+def test_any_name_is_written_and_read_back(
+    tmp_path_factory: pytest.TempPathFactory, name: str
+) -> None:
+    config = TrainingConfig(level="flat", demonstrations=name)
+    file = written(tmp_path_factory.mktemp("config"), config.to_yaml())
+    assert load_config(file) == config
+
+
+@given(text=st.text(max_size=60))
+def test_an_override_is_taken_or_refused_and_nothing_else(
+    tmp_path_factory: pytest.TempPathFactory, text: str
+) -> None:
+    file = written(tmp_path_factory.getbasetemp(), "level: flat")
+    for override in (text, f"seed={text}", f"{text}=1"):
+        with suppress(ConfigError):
+            load_config(file, [override])
+
+
+def test_names_are_told_without_what_a_terminal_obeys(tmp_path: Path) -> None:
+    file = tmp_path / "red\x1b[31m.yaml"
+    for overrides in ([], ["level=\x1b[31m"]):
+        with pytest.raises(ConfigError) as caught:
+            load_config(file, overrides)
+        assert "\\x1b[31m" in str(caught.value)
+        assert "\x1b" not in str(caught.value)
+        file.write_text("level: flat")
 
 
 def test_two_configurations_are_compared_field_by_field() -> None:

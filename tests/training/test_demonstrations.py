@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import pickle
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -134,6 +136,30 @@ def test_a_data_set_of_another_environment_is_refused(
     other = small_config(level="bridge", environment={"physics": "fast"})
     with pytest.raises(DemonstrationError, match="found level 'flat', not 'bridge'"):
         load_demonstrations("roller/flat/test-v0", other)
+
+
+def test_nothing_in_a_data_set_is_executed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("minari", reason="the extra 'demos' is not installed")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    to_minari([wandered("flat", seed=seed) for seed in range(2)], "roller/flat/test-v0")
+    data = tmp_path / "roller" / "flat" / "test-v0" / "data"
+    # The environment that it says it was made in is not imported.
+    (tmp_path / "harm.py").write_text(f"open({str(tmp_path / 'harmed')!r}, 'w')")
+    monkeypatch.syspath_prepend(tmp_path)
+    metadata = json.loads((data / "metadata.json").read_text())
+    said = json.loads(metadata["env_spec"]) | {"entry_point": "harm:make"}
+    (data / "metadata.json").write_text(json.dumps(metadata | {"env_spec": json.dumps(said)}))
+    assert len(load_demonstrations("roller/flat/test-v0", training())) == 2
+    # Nor is anything unpickled.
+    harm = b"cos\nsystem\n(S'touch harmed'\ntR."
+    monkeypatch.chdir(tmp_path)
+    for file in sorted(data.iterdir(), reverse=True):
+        file.write_bytes(harm)
+        with pytest.raises(DemonstrationError, match=r"not a whole|no replay, directory"):
+            load_demonstrations(str(data.parent), training())
+    assert not (tmp_path / "harmed").exists()
+    pickle.loads(harm)
+    assert (tmp_path / "harmed").exists()
 
 
 def test_what_cannot_be_learnt_from_is_refused(

@@ -22,7 +22,8 @@ from roller_env.training.evaluate import (
     proportion,
     rows_and_repeats,
 )
-from roller_env.training.policy import Observations
+from roller_env.training.files import RunError
+from roller_env.training.normalisation import Observations
 
 Z95 = NormalDist().inv_cdf(0.975)
 FORWARD = 1
@@ -32,6 +33,12 @@ def all_but_the_first_row_wait(observations: Observations) -> npt.NDArray[Any]:
     actions = np.zeros(len(observations), dtype=np.int64)
     actions[0] = FORWARD
     return actions
+
+
+@pytest.mark.parametrize("episodes", [0, -1, 10**9])
+def test_a_number_of_episodes_that_cannot_be_played_is_refused(episodes: int) -> None:
+    with pytest.raises(RunError, match=f"episodes: found {episodes}; must be 1 to 1000000"):
+        rows_and_repeats(episodes)
 
 
 @given(st.integers(1, 10_000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))

@@ -14,7 +14,7 @@ from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.replay import load_replay, verify
 from roller_env.training.evaluate import Evaluation, evaluate
 from roller_env.training.files import RunError
-from roller_env.training.policy import Observations
+from roller_env.training.normalisation import Observations
 from roller_env.training.replays import save_replays
 from tests.training.small import small_config
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import resource
+import runpy
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +19,10 @@ import pytest
 import torch
 
 from roller_env.drawing.opengl import missing_opengl
-from roller_env.training.config import TrainingConfig
-from roller_env.training.files import RunError, RunFiles
+from roller_env.level import LevelError
+from roller_env.training.config import TrainingConfig, load_config
+from roller_env.training.demonstrations import DemonstrationError
+from roller_env.training.files import RunError, RunFiles, run_directory
 from roller_env.training.logs import STEPS, read_progress
 from roller_env.training.policy import TrainedPolicy, load_policy
 from roller_env.training.ppo import learn, make_environments, new_model
@@ -127,9 +132,7 @@ def test_a_little_training_on_the_flat_level_finds_the_way_and_leaves_every_file
     run = train(config, tmp_path / "run")
     trained = evaluate_policy(load_policy(run.files.directory), config, 20)
     untrained_model = new_model(config, make_environments(config))
-    normaliser = untrained_model.get_vec_normalize_env()
-    assert normaliser is not None
-    untrained = evaluate_policy(TrainedPolicy(untrained_model, normaliser, config), config, 20)
+    untrained = evaluate_policy(TrainedPolicy.of(untrained_model, config), config, 20)
     assert trained.table()["success rate"].mean >= 0.9
     assert untrained.table()["success rate"].mean <= 0.5
 
@@ -149,10 +152,134 @@ def test_a_little_training_on_the_flat_level_finds_the_way_and_leaves_every_file
 def test_a_run_is_not_overwritten_by_another(tmp_path: Path) -> None:
     files = RunFiles(tmp_path)
     files.config.write_text(small_config().to_yaml())
+    learn(small_config(total_steps=128), files)
     with pytest.raises(RunError, match="--resume goes on with it"):
         train(small_config(), tmp_path)
     with pytest.raises(RunError, match=r"another configuration[^\n]*\n  seed: 3, 4"):
         train(small_config(seed=4), tmp_path, resume=True)
+
+
+@contextmanager
+def largest_file(bytes_: int) -> Iterator[None]:
+    """Let no file grow larger, as if the disk were full then."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_a_training_whose_disk_was_full_says_what_is_kept_and_goes_on_with_the_same_bits(
+    tmp_path: Path,
+) -> None:
+    config = small_config()
+    whole = RunFiles(tmp_path / "whole")
+    model, _ = learn(config, whole)
+    run = tmp_path / "run"
+    with (
+        largest_file(100),
+        pytest.raises(
+            RunError, match=r"config\.yaml: File too large; nothing was kept yet.*--resume"
+        ),
+    ):
+        train(config, run)
+    # A checkpoint grows with the games that have reached waypoints.
+    first = RunFiles(tmp_path / "first")
+    learn(small_config(total_steps=128), first)
+    sizes = [files.checkpoint.stat().st_size for files in (first, whole)]
+    assert sizes[0] < sizes[1]
+    with (
+        largest_file(sum(sizes) // 2),
+        pytest.raises(RunError, match=r"checkpoint at \d+ steps.*--resume goes on from there"),
+    ):
+        train(config, run, resume=True)
+    resumed, _ = learn(config, RunFiles(run))
+    for name, value in model.policy.state_dict().items():
+        assert torch.equal(resumed.policy.state_dict()[name], value), name
+
+
+def test_a_directory_that_cannot_be_made_is_named(tmp_path: Path) -> None:
+    (tmp_path / "runs").write_text("a file")
+    with pytest.raises(RunError, match=r"runs/run: Not a directory; nothing was kept yet"):
+        train(small_config(), tmp_path / "runs" / "run")
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"level": "flatt"}, LevelError, "did you mean 'flat'"),
+        ({"demonstrations": "nowhere"}, DemonstrationError, "nowhere"),
+    ],
+)
+def test_a_start_that_fails_leaves_no_directory(
+    tmp_path: Path, changes: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        train(small_config(**changes), tmp_path / "runs" / "typo")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_directory_in_which_nothing_has_begun_is_no_obstacle(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = RunFiles(tmp_path)
+    files.config.write_text(small_config(seed=4).to_yaml())
+    files.progress.write_text("")
+
+    def interrupted(config: TrainingConfig, files: RunFiles) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("roller_env.training.run.learn", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        train(small_config(), tmp_path)
+    assert load_config(files.config) == small_config()
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["../../x", "..", ".", "", "/tmp/x", "a/b", "a/", ".hidden", "red\x1b[31m", "a\0b", "ä" * 76],
+)
+def test_a_name_that_leaves_the_directory_of_runs_is_refused(name: str) -> None:
+    with pytest.raises(RunError, match="must be a name for a directory inside runs") as caught:
+        run_directory(Path("runs"), name)
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize("name", ["ppo_classic-seed0", "far-sighted", "a b", "Übung.2", "ä" * 75])
+def test_a_name_of_one_directory_is_taken(name: str) -> None:
+    assert run_directory(Path("runs"), name) == Path("runs") / name
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--name", "../../x"], "name: found '../../x'; must be"),
+        (["--name", "typo", "--set", "level=flatt"], "did you mean 'flat'"),
+        (["--set", "level=\x1b[31m"], "\\x1b[31m"),
+        (["--config", "red\x1b[31m.yaml"], "red\\x1b[31m.yaml': there is no such file"),
+    ],
+    ids=["name", "level", "escape", "file"],
+)
+def test_the_command_line_says_in_one_line_what_is_wrong_and_makes_no_directory(
+    tmp_path: Path,
+    options: list[str],
+    message: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    config = tmp_path / "training.yaml"
+    config.write_text(small_config().to_yaml())
+    monkeypatch.setattr(
+        sys, "argv", ["train.py", "--config", str(config), "--runs", str(tmp_path / "r"), *options]
+    )
+    with pytest.raises(SystemExit) as caught:
+        runpy.run_path(str(ROOT / "scripts" / "train.py"), run_name="__main__")
+    assert isinstance(caught.value.code, str)
+    assert caught.value.code.startswith("error: ")
+    assert message in caught.value.code
+    assert "\x1b" not in caught.value.code + capsys.readouterr().out
+    assert not (tmp_path / "r").exists()
 
 
 def test_a_training_stops_between_two_updates_when_its_time_is_up(tmp_path: Path) -> None:
@@ -185,5 +312,5 @@ def test_every_kind_of_observation_and_action_can_be_trained(
 
 
 def test_a_run_without_a_policy_says_how_to_get_one(tmp_path: Path) -> None:
-    with pytest.raises(RunError, match=r"has no config\.yaml; .*--resume"):
+    with pytest.raises(RunError, match=r"has no policy\.json; .*--resume"):
         load_policy(tmp_path)
