@@ -234,7 +234,6 @@ class Simulation:
         motion = sweep.Motion(
             ball=path[:, :, ball : ball + 3],
             plate=path[:, -1, self.compiled.plate_qpos],
-            velocity=self._velocity[every].copy(),
             duration_s=self.duration_s,
         )
         events = sweep.find_events(state, table, motion)

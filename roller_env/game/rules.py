@@ -119,7 +119,6 @@ def apply(state: GameState, table: LevelTable, motion: Motion, events: Events) -
         state.control_delay_s,
     )
     triggers = table.slices[Kind.TRIGGER]
-    state.camera_heading = cameras.follow_heading(state.camera_heading, motion.velocity)
     cameras.move(
         motion.duration_s,
         motion.ball[:, -1],

@@ -34,13 +34,11 @@ class Motion:
     Attributes:
         ball: (N, S + 1, 3) ball centres before the first substep and after each, world frame.
         plate: (N, P) plates' displacements from where they began, at the end, <= 0.
-        velocity: (N, 3) the ball's velocity at the end, world frame.
         duration_s: length of the control step.
     """
 
     ball: Float64
     plate: Float64
-    velocity: Float64
     duration_s: float
 
 
