@@ -54,7 +54,8 @@ class RollerEnv(gym.Env[Any, Any]):
 
         Args:
             seed: seeds the environment's generator, as Gymnasium says.
-            options: ``{"intro": True}`` lets the keys work only after the original's 6 s.
+            options: ``{"intro": True}`` begins as the original does when it is started: the ball
+                hangs still for 1.17 s, and the keys work after 6 s.
         """
         super().reset(seed=seed)
         self.simulation.seed([self.np_random])

@@ -129,6 +129,23 @@ def find_events(state: GameState, table: LevelTable, motion: Motion) -> Events:
     )
 
 
+def forget(events: Events, rows: Bool) -> None:
+    """Let nothing have happened in the games where ``rows``, (N,), says so."""
+    events.entry[rows] = np.inf
+    events.end[rows] = np.inf
+    events.points[rows] = 0
+    for happened in (
+        events.inside,
+        events.coins,
+        events.plates,
+        events.pads,
+        events.triggers,
+        events.finished,
+        events.fallen,
+    ):
+        happened[rows] = False
+
+
 def find_entries(
     path: Float64, table: LevelTable, touching: Bool, live: Bool
 ) -> tuple[Float64, Bool]:
