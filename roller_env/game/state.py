@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,10 @@ from roller_env.game.tables import Kind, LevelTable
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
+
+COIN_ON_PANELS: Final = 10
+"""What a coin counts on whatever shows a player how the game stands: the original's `digits` show
+ten times the variable. Rewards, scores and all that programs read count a coin as one."""
 
 
 @dataclass(eq=False)
