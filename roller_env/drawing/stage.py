@@ -18,6 +18,7 @@ from roller_env.compile.scenery import (
     GATE_BARS,
     SPARKS,
     STATES,
+    band_count,
     build_scenery,
     part,
     ring_count,
@@ -42,12 +43,15 @@ COIN_BOBS_PER_S: Final = 0.6
 RING_SPEED_M_S: Final = quants(16.0)
 """`btube` scrolls its texture by 16 units a second."""
 
+BAND_SPEED_M_S: Final = quants(5.0 * 60.0)
+"""`camch2` scrolls its texture by 5 units a frame: read, as the tube's, as quants."""
+
 FRAME_S: Final = 1.0 / 60.0
 SPARK_LIFE_S: Final = 0.625
 SPARK_SPEED_M_S: Final = quants(5.0 * 16.0)
 """`fire1`: up to 5 quants a tick of 1/16 s along each axis."""
-SPARK_RADIUS_M: Final = quants(4.0)
-"""The original's 20 are the edge of a bitmap that is mostly transparent."""
+SPARK_RADIUS_M: Final = quants(20.0) / 2.0
+"""`fire1`: a size of 20 quants, the width of the bitmap."""
 
 SEEN_FROM_BELOW_ALPHA: Final = 0.35
 
@@ -90,7 +94,11 @@ class Stage:
             for number, tube in enumerate(level.tubes)
         ]
         self._panes = [
-            (number, model.geom(part("trigger", number)).id)
+            (
+                number,
+                model.geom(part("trigger", number)).id,
+                self._ids(part("band", number, band) for band in range(band_count(trigger))),
+            )
             for number, trigger in enumerate(level.camera_triggers)
             if TriggerKind[trigger.kind.upper()] is TriggerKind.RETREAT
         ]
@@ -118,8 +126,7 @@ class Stage:
         self._show_machines(state, row)
         self._show_rings(time_s)
         self._show_sparks(time_s)
-        for number, geom in self._panes:
-            self._hide(geom, state.trigger_spent[row, number])
+        self._show_panes(state.trigger_spent[row], time_s)
 
     def light_from(self, centre: Float64) -> None:
         """Let the sun cast shadows round ``centre``, (3,) metres."""
@@ -184,6 +191,15 @@ class Stage:
             spacing = length / len(rings)
             place = (np.arange(len(rings)) * spacing + RING_SPEED_M_S * time_s) % length
             self.data.geom_xpos[rings] = start + place[:, None] * along / length
+
+    def _show_panes(self, spent: Bool, time_s: float) -> None:
+        """Let the bands run up the panes of the retreat triggers that are not dead yet."""
+        for number, pane, bands in self._panes:
+            self._hide(pane, spent[number])
+            self._hide(bands, spent[number])
+            height = 2.0 * (self.model.geom_size[pane, 2] - self.model.geom_size[bands[0], 2])
+            place = (np.arange(len(bands)) / len(bands) * height + BAND_SPEED_M_S * time_s) % height
+            self.data.geom_xpos[bands, 2] += place - height / 2.0
 
     def _show_sparks(self, time_s: float) -> None:
         """Let a particle fly out of the finish every frame, shrinking and fading."""
