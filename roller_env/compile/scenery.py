@@ -44,8 +44,12 @@ SPARKS: Final = 38
 RING_SPACING_M: Final = quants(96.0)
 """Distance between the bands that run along a tube."""
 
+PANE_COLOUR: Final = "#0101c8"
 PANE_ALPHA: Final = 0.70
-"""`camch2`: opacity of a retreat trigger's pane."""
+"""`camch2`: red, green and blue, and the opacity, of a retreat trigger's pane."""
+
+SPARK_COLOUR: Final = "#01ff64"
+"""`fire1`: red, green and blue of the finish's particles."""
 
 BAND_SPACING_M: Final = quants(32.0)
 """Distance between the bands that run up a retreat trigger's pane."""
@@ -174,11 +178,11 @@ def _add_state_materials(spec: mujoco.MjSpec) -> None:
     _add_material(spec, "ring/", "#bff0ff59", emission=0.8)
     _add_material(spec, "collar/", "#e9eef3", specular=0.7, shininess=0.7)
     _add_material(spec, "gold/", "#ffc928", emission=0.28, specular=0.9, shininess=0.6)
-    _add_material(spec, "trigger/", "#0101c8", emission=0.4)
+    _add_material(spec, "trigger/", PANE_COLOUR, emission=0.4)
     spec.material("trigger/").rgba[3] = alpha_of_face(PANE_ALPHA)
     _add_material(spec, "band/", "#3d63ff", emission=0.6)
     _add_material(spec, "beam/", "#4fe39a", emission=0.35)
-    _add_material(spec, "spark/", "#01ff64", emission=1.0)
+    _add_material(spec, "spark/", SPARK_COLOUR, emission=1.0)
 
 
 def _add_ground(spec: mujoco.MjSpec, level: Level) -> None:
@@ -385,8 +389,7 @@ def _coin_surface(segments: int) -> Surface:
 def _add_triggers(spec: mujoco.MjSpec, level: Level) -> None:
     """Show the retreat triggers as blue panes, as `camch2` does; the other triggers are unseen.
 
-    Its red 1, green 1, blue 200 and alpha 70 percent are the pane's; bands of a lighter blue show
-    that its texture scrolls.
+    Bands of a lighter blue show that the pane's texture scrolls.
     """
     for number, trigger in enumerate(level.camera_triggers):
         if trigger.kind != "retreat" or trigger.size is None:

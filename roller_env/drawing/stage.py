@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from roller_env.compile.scenery import (
     GATE_BARS,
+    SPARK_COLOUR,
     SPARKS,
     STATES,
     band_count,
@@ -23,6 +24,7 @@ from roller_env.compile.scenery import (
     part,
     ring_count,
 )
+from roller_env.compile.textures import parse_colour
 from roller_env.game.cameras import MODE_BELOW, MODE_FIRST_PERSON, TriggerKind
 from roller_env.game.state import GameState
 from roller_env.level.expand import coin_positions
@@ -47,11 +49,14 @@ BAND_SPEED_M_S: Final = quants(5.0 * 60.0)
 """`camch2` scrolls its texture by 5 units a frame: read, as the tube's, as quants."""
 
 FRAME_S: Final = 1.0 / 60.0
-SPARK_LIFE_S: Final = 0.625
 SPARK_SPEED_M_S: Final = quants(5.0 * 16.0)
 """`fire1`: up to 5 quants a tick of 1/16 s along each axis."""
-SPARK_RADIUS_M: Final = quants(20.0) / 2.0
-"""`fire1`: a size of 20 quants, the width of the bitmap."""
+SPARK_WIDTH_M: Final = quants(20.0)
+"""`fire1`: the size of a particle when it is born."""
+SPARK_FADING_PER_S: Final = 160.0
+SPARK_LIFE_S: Final = 100.0 / SPARK_FADING_PER_S
+"""`smoke_property`: alpha falls from 100 by 160 a second, and the size from 20 quants by 32: both
+are nought at the same time."""
 
 SEEN_FROM_BELOW_ALPHA: Final = 0.35
 
@@ -209,10 +214,9 @@ class Stage:
         share = np.clip(1.0 - age / SPARK_LIFE_S, 0.0, 1.0)
         flight = self._spark_velocity[born % _SPARK_CYCLE] * age[:, None]
         self.data.geom_xpos[self._sparks] = np.array(self._level.finish.at) + flight
-        self.model.geom_size[self._sparks, 0] = SPARK_RADIUS_M * np.maximum(share, 0.01)
-        self.model.geom_rgba[self._sparks] = np.column_stack(
-            [np.broadcast_to([0.004, 1.0, 0.392], (SPARKS, 3)), share]
-        )
+        self.model.geom_size[self._sparks, 0] = 0.5 * SPARK_WIDTH_M * np.maximum(share, 0.01)
+        self.model.geom_rgba[self._sparks, :3] = parse_colour(SPARK_COLOUR)[0]
+        self.model.geom_rgba[self._sparks, 3] = share
 
 
 _SPARK_CYCLE: Final = 256
