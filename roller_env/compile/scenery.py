@@ -180,7 +180,7 @@ def _add_state_materials(spec: mujoco.MjSpec) -> None:
     _add_material(spec, "gold/", "#ffc928", emission=0.28, specular=0.9, shininess=0.6)
     _add_material(spec, "trigger/", PANE_COLOUR, emission=0.4)
     spec.material("trigger/").rgba[3] = alpha_of_face(PANE_ALPHA)
-    _add_material(spec, "band/", "#3d63ff", emission=0.6)
+    _add_material(spec, "band/", "#6f8bffa0", emission=0.6)
     _add_material(spec, "beam/", "#4fe39a", emission=0.35)
     _add_material(spec, "spark/", SPARK_COLOUR, emission=1.0)
 
@@ -224,7 +224,8 @@ def _add_level_material(
 def alpha_of_face(alpha: float) -> float:
     """Return the opacity, 0 to 1, of each face of a body that is to have ``alpha`` as a whole.
 
-    MuJoCo draws both faces of a wall or slab that one can see through, one over the other.
+    MuJoCo draws both faces of a wall or slab that one can see through, one over the other. Studio's
+    page draws the nearer one, and mixes in linear light: there it looks like half instead of 0.6.
     """
     return 1.0 - math.sqrt(1.0 - alpha)
 
