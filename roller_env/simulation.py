@@ -261,8 +261,8 @@ class Simulation:
 
         Args:
             rows: (n,) row indices.
-            intro: whether the keys work only after the intro's `rules.INTRO_S`, as when the game
-                is started; after a fall it goes on at once.
+            intro: whether the ball hangs still for `rules.HANGING_S` and the keys work only after
+                `rules.INTRO_S`, as when the game is started; after a fall it goes on at once.
             placement: of the n balls, from `placement`; the rows' generators draw the same numbers
                 with one as without.
 
@@ -386,7 +386,8 @@ class Simulation:
         placement = self._placement(every) if rules.anything_moves(state) else None
         controls = rules.controls(state, table, force_n, placement, self.duration_s)
         self._set_controls(every, controls)
-        path = self._stepper.advance(rows)
+        hanging = controls.hanging_s if controls.hanging_s.any() else None
+        path = self._stepper.advance(rows) if hanging is None else self._let_go(rows, hanging)
         diverged = self._stepper.diverged()[every] | ~np.isfinite(path[:, -1]).all(axis=1)
         if diverged.any():
             self._end_diverged(every, diverged, path, before, table)
@@ -395,10 +396,11 @@ class Simulation:
         motion = sweep.Motion(
             ball=path[:, :, ball : ball + 3],
             plate=path[:, -1, self.compiled.plate_qpos],
-            velocity=self._velocity[every].copy(),
             duration_s=self.duration_s,
         )
         events = sweep.find_events(state, table, motion)
+        if hanging is not None:
+            sweep.forget(events, hanging > self.duration_s - 1e-9)
         reward = rewards.points_reward(events, self.config.reward_weights)
         rules.apply(state, table, motion, events)
         state.truncated = ~state.terminated & (state.steps >= self._max_steps[every])
@@ -417,6 +419,11 @@ class Simulation:
             plate_aim=act[:, compiled.plate_act].copy(),
             gate_aim=act[:, compiled.gate_act].copy(),
         )
+
+    def _let_go(self, rows: Int64 | None, hanging_s: Float64) -> Float64:
+        """Advance rows of which some begin to move only after ``hanging_s``, (n,); return paths."""
+        still = np.rint(hanging_s / self.compiled.preset.dt_s).astype(np.int64)
+        return self._stepper.advance_late(rows, np.minimum(still, self._stepper.substeps))
 
     def _set_controls(self, rows: Int64 | slice, controls: rules.Controls) -> None:
         ctrl = np.empty((len(controls.force_n), self._stepper.ctrl.shape[1]))

@@ -22,7 +22,7 @@ from roller_env.compile.merge import merge_solids
 from roller_env.compile.mjcf import BALL, build_spec
 from roller_env.compile.surfaces import Surface, box_surfaces, full_turn, lathe, tube_surface
 from roller_env.level.expand import Solid, coin_positions, rotation_matrix, solids, tube_frame
-from roller_env.level.schema import Gate, Level, LiftPad, Material, Plate, Tube
+from roller_env.level.schema import CameraTrigger, Gate, Level, LiftPad, Material, Plate, Tube
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.units import quants
 
@@ -43,6 +43,18 @@ SPARKS: Final = 38
 
 RING_SPACING_M: Final = quants(96.0)
 """Distance between the bands that run along a tube."""
+
+PANE_COLOUR: Final = "#0101c8"
+PANE_ALPHA: Final = 0.70
+"""`camch2`: red, green and blue, and the opacity, of a retreat trigger's pane."""
+
+SPARK_COLOUR: Final = "#01ff64"
+"""`fire1`: red, green and blue of the finish's particles."""
+
+BAND_SPACING_M: Final = quants(32.0)
+"""Distance between the bands that run up a retreat trigger's pane."""
+
+BAND_HALF_HEIGHT_M: Final = quants(3.0)
 
 GATE_BARS: Final = 7
 
@@ -107,6 +119,7 @@ def _add_material(
     specular: float = 0.2,
     shininess: float = 0.3,
 ) -> None:
+    """Add a material; ``colour`` is that of a face."""
     rgb, alpha = textures.parse_colour(colour)
     material = spec.add_material(
         name=name,
@@ -165,9 +178,11 @@ def _add_state_materials(spec: mujoco.MjSpec) -> None:
     _add_material(spec, "ring/", "#bff0ff59", emission=0.8)
     _add_material(spec, "collar/", "#e9eef3", specular=0.7, shininess=0.7)
     _add_material(spec, "gold/", "#ffc928", emission=0.28, specular=0.9, shininess=0.6)
-    _add_material(spec, "trigger/", "#4aa3ff26", emission=0.4)
+    _add_material(spec, "trigger/", PANE_COLOUR, emission=0.4)
+    spec.material("trigger/").rgba[3] = alpha_of_face(PANE_ALPHA)
+    _add_material(spec, "band/", "#6f8bffa0", emission=0.6)
     _add_material(spec, "beam/", "#4fe39a", emission=0.35)
-    _add_material(spec, "spark/", "#01ff64", emission=1.0)
+    _add_material(spec, "spark/", SPARK_COLOUR, emission=1.0)
 
 
 def _add_ground(spec: mujoco.MjSpec, level: Level) -> None:
@@ -202,8 +217,17 @@ def _add_level_material(
     if pixels is None:
         pixels = textures.floor_pixels(rgb, material.pattern)
     textures.add_texture(spec, name, "2d", pixels)
-    see_through = f"#ffffff{round(alpha * 255):02x}"
-    _add_material(spec, name, see_through, texture=name, specular=0.15, shininess=0.4)
+    _add_material(spec, name, texture=name, specular=0.15, shininess=0.4)
+    spec.material(name).rgba[3] = alpha_of_face(alpha)
+
+
+def alpha_of_face(alpha: float) -> float:
+    """Return the opacity, 0 to 1, of each face of a body that is to have ``alpha`` as a whole.
+
+    MuJoCo draws both faces of a wall or slab that one can see through, one over the other. Studio's
+    page draws the nearer one, and mixes in linear light: there it looks like half instead of 0.6.
+    """
+    return 1.0 - math.sqrt(1.0 - alpha)
 
 
 def _add_surface(
@@ -364,12 +388,28 @@ def _coin_surface(segments: int) -> Surface:
 
 
 def _add_triggers(spec: mujoco.MjSpec, level: Level) -> None:
-    """Show the one-time triggers as faint blue panes, like the original; the others are unseen."""
+    """Show the retreat triggers as blue panes, as `camch2` does; the other triggers are unseen.
+
+    Bands of a lighter blue show that the pane's texture scrolls.
+    """
     for number, trigger in enumerate(level.camera_triggers):
-        if trigger.kind == "retreat" and trigger.size is not None:
-            half = [edge / 2 for edge in trigger.size]
-            pane = _box(half, pos=trigger.at, material="trigger/", castshadow=False)
-            _add(spec.worldbody, part("trigger", number), **pane)
+        if trigger.kind != "retreat" or trigger.size is None:
+            continue
+        x, y, z = (edge / 2 for edge in trigger.size)
+        pane = _box([x, y, z], pos=trigger.at, material="trigger/", castshadow=False)
+        _add(spec.worldbody, part("trigger", number), **pane)
+        proud = quants(0.2)
+        half = [x + proud, y + proud, min(BAND_HALF_HEIGHT_M, 0.5 * z)]
+        for band in range(band_count(trigger)):
+            box = _box(half, pos=trigger.at, material="band/", castshadow=False)
+            _add(spec.worldbody, part("band", number, band), **box)
+
+
+def band_count(trigger: CameraTrigger) -> int:
+    """Return how many bands run up a trigger's pane: at least one up that of a retreat."""
+    if trigger.kind != "retreat" or trigger.size is None:
+        return 0
+    return max(1, int(trigger.size[2] / BAND_SPACING_M))
 
 
 def _add_finish(spec: mujoco.MjSpec, level: Level) -> None:

@@ -83,7 +83,7 @@ class GameRenderer:
         stage.light_from(ball[0])
         modes = np.array([mode])
         position = camera_position(modes, ball, state.camera_x[row : row + 1])
-        target = camera_target(modes, ball, state.camera_heading[row : row + 1])
+        target = camera_target(modes, ball)
         return canvas.draw(stage.data, look(position[0], target[0]))
 
     def close(self) -> None:

@@ -16,12 +16,15 @@ import numpy.typing as npt
 
 from roller_env.compile.scenery import (
     GATE_BARS,
+    SPARK_COLOUR,
     SPARKS,
     STATES,
+    band_count,
     build_scenery,
     part,
     ring_count,
 )
+from roller_env.compile.textures import parse_colour
 from roller_env.game.cameras import MODE_BELOW, MODE_FIRST_PERSON, TriggerKind
 from roller_env.game.state import GameState
 from roller_env.level.expand import coin_positions
@@ -42,12 +45,18 @@ COIN_BOBS_PER_S: Final = 0.6
 RING_SPEED_M_S: Final = quants(16.0)
 """`btube` scrolls its texture by 16 units a second."""
 
+BAND_SPEED_M_S: Final = quants(5.0 * 60.0)
+"""`camch2` scrolls its texture by 5 units a frame: read, as the tube's, as quants."""
+
 FRAME_S: Final = 1.0 / 60.0
-SPARK_LIFE_S: Final = 0.625
 SPARK_SPEED_M_S: Final = quants(5.0 * 16.0)
 """`fire1`: up to 5 quants a tick of 1/16 s along each axis."""
-SPARK_RADIUS_M: Final = quants(4.0)
-"""The original's 20 are the edge of a bitmap that is mostly transparent."""
+SPARK_WIDTH_M: Final = quants(20.0)
+"""`fire1`: the size of a particle when it is born."""
+SPARK_FADING_PER_S: Final = 160.0
+SPARK_LIFE_S: Final = 100.0 / SPARK_FADING_PER_S
+"""`smoke_property`: alpha falls from 100 by 160 a second, and the size from 20 quants by 32: both
+are nought at the same time."""
 
 SEEN_FROM_BELOW_ALPHA: Final = 0.35
 
@@ -90,7 +99,11 @@ class Stage:
             for number, tube in enumerate(level.tubes)
         ]
         self._panes = [
-            (number, model.geom(part("trigger", number)).id)
+            (
+                number,
+                model.geom(part("trigger", number)).id,
+                self._ids(part("band", number, band) for band in range(band_count(trigger))),
+            )
             for number, trigger in enumerate(level.camera_triggers)
             if TriggerKind[trigger.kind.upper()] is TriggerKind.RETREAT
         ]
@@ -118,8 +131,7 @@ class Stage:
         self._show_machines(state, row)
         self._show_rings(time_s)
         self._show_sparks(time_s)
-        for number, geom in self._panes:
-            self._hide(geom, state.trigger_spent[row, number])
+        self._show_panes(state.trigger_spent[row], time_s)
 
     def light_from(self, centre: Float64) -> None:
         """Let the sun cast shadows round ``centre``, (3,) metres."""
@@ -185,6 +197,15 @@ class Stage:
             place = (np.arange(len(rings)) * spacing + RING_SPEED_M_S * time_s) % length
             self.data.geom_xpos[rings] = start + place[:, None] * along / length
 
+    def _show_panes(self, spent: Bool, time_s: float) -> None:
+        """Let the bands run up the panes of the retreat triggers that are not dead yet."""
+        for number, pane, bands in self._panes:
+            self._hide(pane, spent[number])
+            self._hide(bands, spent[number])
+            height = 2.0 * (self.model.geom_size[pane, 2] - self.model.geom_size[bands[0], 2])
+            place = (np.arange(len(bands)) / len(bands) * height + BAND_SPEED_M_S * time_s) % height
+            self.data.geom_xpos[bands, 2] += place - height / 2.0
+
     def _show_sparks(self, time_s: float) -> None:
         """Let a particle fly out of the finish every frame, shrinking and fading."""
         newest = math.floor(time_s / FRAME_S)
@@ -193,10 +214,9 @@ class Stage:
         share = np.clip(1.0 - age / SPARK_LIFE_S, 0.0, 1.0)
         flight = self._spark_velocity[born % _SPARK_CYCLE] * age[:, None]
         self.data.geom_xpos[self._sparks] = np.array(self._level.finish.at) + flight
-        self.model.geom_size[self._sparks, 0] = SPARK_RADIUS_M * np.maximum(share, 0.01)
-        self.model.geom_rgba[self._sparks] = np.column_stack(
-            [np.broadcast_to([0.004, 1.0, 0.392], (SPARKS, 3)), share]
-        )
+        self.model.geom_size[self._sparks, 0] = 0.5 * SPARK_WIDTH_M * np.maximum(share, 0.01)
+        self.model.geom_rgba[self._sparks, :3] = parse_colour(SPARK_COLOUR)[0]
+        self.model.geom_rgba[self._sparks, 3] = share
 
 
 _SPARK_CYCLE: Final = 256

@@ -14,6 +14,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from roller_env.drawing.canvas import Picture
 from roller_env.drawing.renderer import GameRenderer
+from roller_env.game.state import COIN_ON_PANELS
 from roller_env.simulation import Simulation
 
 Float64 = npt.NDArray[np.float64]
@@ -132,6 +133,20 @@ def _frames(
         yield frame
 
 
+def panel_lines(simulation: Simulation, row: int = 0) -> list[str]:
+    """Return what the panel says of a game: points, coins and time, and how it ended."""
+    results = {name: values[0] for name, values in simulation.results(np.array([row])).items()}
+    coins, coins_in_level = results["coins"], simulation.table.coin_count[row]
+    lines = [
+        f"{COIN_ON_PANELS * coins} points   {results['time_s']:.1f} s",
+        f"{coins} of {coins_in_level} coins",
+    ]
+    if simulation.state.over[row]:
+        end = "finish" if results["success"] else "fall" if results["fall"] else "time up"
+        lines.append(f"{end}: {results['score_percent']:.0f} %")
+    return lines
+
+
 def with_panel(picture: Picture, simulation: Simulation, row: int = 0) -> Picture:
     """Return a picture with the game's points, time and end written on it."""
     image = Image.fromarray(picture)
@@ -139,12 +154,7 @@ def with_panel(picture: Picture, simulation: Simulation, row: int = 0) -> Pictur
     height = picture.shape[0]
     font = ImageFont.load_default(size=max(height // 18, 10))
     margin = height // 40
-    points, coins = simulation.state.points[row], simulation.table.coin_count[row]
-    text = f"{points} / {coins}    {simulation.time_s[row]:.1f} s"
-    if simulation.state.over[row]:
-        results = simulation.results(np.array([row]))
-        end = "finish" if results["success"][0] else "fall" if results["fall"][0] else "time up"
-        text += f"    {end}: {results['score_percent'][0]:.0f} %"
+    text = "\n".join(panel_lines(simulation, row))
     left, top, right, bottom = draw.textbbox((2 * margin, 2 * margin), text, font=font)
     box = (left - margin, top - margin, right + margin, bottom + margin)
     draw.rounded_rectangle(box, radius=margin, fill=(16, 24, 40, 150))

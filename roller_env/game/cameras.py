@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from enum import IntEnum
 from typing import Final
 
@@ -42,6 +41,12 @@ _FIRST_PERSON: Final = int(TriggerKind.FIRST_PERSON)
 OVERHEAD_DELAY_S: Final = 100.0 / 60.0
 """`flipcam` waits 100 frames, at the nominal 60 frames a second."""
 
+OVERHEAD_WAITS: Final = 8
+"""Entries of one game that can wait at once. `flipcam` runs once for every impact: each entry sets
+mode 2 at the end of a wait of its own, and other events may set other modes in between. A ball that
+enters more often in `OVERHEAD_DELAY_S` turns round every fifth of a second; the newest entry then
+takes the place of the one before."""
+
 OFFSETS_M: Final = METRES_PER_QUANT * np.array(
     [
         [-100.0, 0.0, 80.0],
@@ -57,9 +62,9 @@ OFFSETS_M: Final = METRES_PER_QUANT * np.array(
 RETREAT_SPEED_M_S: Final = quants(16.0)
 """Speed of the camera in mode 1: one quant in a tick of 1/16 s."""
 
-HEADING_SPEED_M_S: Final = 0.1
-"""The first-person camera follows the direction of motion above this speed and keeps the last
-direction below it, where the direction would be noise."""
+FIRST_PERSON_LOOKS: Final = (1.0, 0.0, 0.0)
+"""Unit vector, world frame. `camera1` never turns the camera in mode 4, and W pushes along +x: so W
+is forward for whoever looks, wherever the ball rolls."""
 
 
 def camera_position(mode: Int64, ball: Float64, camera_x: Float64) -> Float64:
@@ -75,12 +80,16 @@ def camera_position(mode: Int64, ball: Float64, camera_x: Float64) -> Float64:
     return position
 
 
-def camera_target(mode: Int64, ball: Float64, heading: Float64) -> Float64:
+def camera_target(mode: Int64, ball: Float64) -> Float64:
     """Return the points, (N, 3) metres, that the cameras look at.
 
-    It is the ball, but in first person a point ahead along ``heading``, (N, 3) unit vectors.
+    It is the ball, but in first person a point a metre ahead along `FIRST_PERSON_LOOKS`.
+
+    Args:
+        mode: (N,) 0 to 5.
+        ball: (N, 3) ball centres, metres.
     """
-    ahead = ball + OFFSETS_M[MODE_FIRST_PERSON] + heading
+    ahead = ball + OFFSETS_M[MODE_FIRST_PERSON] + FIRST_PERSON_LOOKS
     return np.where((mode == MODE_FIRST_PERSON)[:, None], ahead, ball)
 
 
@@ -116,6 +125,9 @@ def move(
 ) -> None:
     """Change the cameras as triggers, lift pads and timers say, after a step.
 
+    A camera that retreats heeds nothing: the original's loop looks at nothing but where the ball is
+    and ends in mode 0, whatever was set meanwhile, by a lift pad too.
+
     Changes ``spent``, ``delay_s``, ``mode`` and ``camera_x`` in place; they are those of
     `roller_env.game.state.GameState`.
 
@@ -128,14 +140,16 @@ def move(
         entry: (N, T) when it entered, substeps.
         thrust_s: (N, A) how much longer the lift pads push.
         spent: (N, T) one-time triggers that are dead.
-        delay_s: (N, T) time until each trigger sets mode 2.
+        delay_s: (N, W) times until mode 2 is set, in order; ``inf`` where no entry waits.
         mode: (N,) camera modes.
         camera_x: (N,) world x of cameras in mode 1, metres.
     """
+    retreats = mode == MODE_RETREAT
     retreat(mode, ball, camera_x, duration_s)
     _move(
         duration_s,
         OFFSETS_M[:, 0],
+        retreats,
         ball,
         kind,
         fired,
@@ -153,6 +167,7 @@ def move(
 def _move(
     duration_s: float,
     offset_x: Float64,
+    retreats: Bool,
     ball: Float64,
     kind: Int64,
     fired: Bool,
@@ -165,11 +180,14 @@ def _move(
     camera_x: Float64,
 ) -> None:
     for row in range(len(mode)):
-        _wait_for_overhead(row, duration_s, delay_s, mode)
+        is_due = _overhead_is_due(row, duration_s, delay_s)
         setting = _fire_triggers(row, kind, fired, inside, entry, spent, delay_s)
+        if retreats[row]:
+            continue
+        if is_due:
+            mode[row] = MODE_OVERHEAD
         if setting >= 0 and kind[row, setting] == _RETREAT:
-            if mode[row] != MODE_RETREAT:
-                camera_x[row] = ball[row, 0] + offset_x[mode[row]]
+            camera_x[row] = ball[row, 0] + offset_x[mode[row]]
             mode[row] = MODE_RETREAT
         elif setting >= 0:
             mode[row] = MODE_FIRST_PERSON
@@ -180,13 +198,28 @@ def _move(
 
 
 @compiled
-def _wait_for_overhead(row: int, duration_s: float, delay_s: Float64, mode: Int64) -> None:
-    """Let the time run that `TriggerKind.OVERHEAD` waits, and change the mode at its end."""
-    for trigger in range(delay_s.shape[1]):
-        delay_s[row, trigger] -= duration_s
-        if delay_s[row, trigger] <= 1e-9:
-            mode[row] = MODE_OVERHEAD
-            delay_s[row, trigger] = np.inf
+def _overhead_is_due(row: int, duration_s: float, delay_s: Float64) -> bool:
+    """Let the times run that entries of `TriggerKind.OVERHEAD` wait; say whether one has ended."""
+    waiting, is_due = 0, False
+    for place in range(delay_s.shape[1]):
+        left = delay_s[row, place] - duration_s
+        delay_s[row, place] = np.inf
+        # Sums of control steps miss the end by rounding.
+        if left > 1e-9:
+            delay_s[row, waiting] = left
+            waiting += 1
+        else:
+            is_due = True
+    return is_due
+
+
+@compiled
+def _wait_for_overhead(row: int, delay_s: Float64) -> None:
+    """Let one more entry wait, behind the others; two of one step are one."""
+    place = 0
+    while place < delay_s.shape[1] - 1 and delay_s[row, place] < OVERHEAD_DELAY_S:
+        place += 1
+    delay_s[row, place] = OVERHEAD_DELAY_S
 
 
 @compiled
@@ -205,30 +238,10 @@ def _fire_triggers(
         if kind[row, trigger] == _FIRST_PERSON:
             acts = acts or inside[row, trigger]
         elif acts and kind[row, trigger] == _OVERHEAD:
-            delay_s[row, trigger] = min(delay_s[row, trigger], OVERHEAD_DELAY_S)
+            _wait_for_overhead(row, delay_s)
             acts = False
         elif acts:
             spent[row, trigger] = True
         if acts and time >= latest:
             setting, latest = trigger, time
     return setting
-
-
-def follow_heading(heading: Float64, velocity: Float64) -> Float64:
-    """Return the direction of motion, (N, 3), or the last one where the ball hardly moves."""
-    direction = np.empty(heading.shape)
-    _follow_heading(heading, velocity, direction)
-    return direction
-
-
-@compiled
-def _follow_heading(heading: Float64, velocity: Float64, direction: Float64) -> None:
-    for row in range(len(heading)):
-        x, y, z = velocity[row, 0], velocity[row, 1], velocity[row, 2]
-        speed = math.sqrt(x * x + y * y + z * z)
-        if speed > HEADING_SPEED_M_S:
-            direction[row, 0] = x / speed
-            direction[row, 1] = y / speed
-            direction[row, 2] = z / speed
-        else:
-            direction[row] = heading[row]

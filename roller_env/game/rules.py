@@ -24,8 +24,15 @@ Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
 
-INTRO_S: Final = 6.0
-"""Time from loading a level to control: one second of splash screen, five of the intro panel."""
+SPLASH_S: Final = 1.0
+"""`main` freezes the game while it shows the splash screen, a second after loading the level."""
+
+INTRO_S: Final = SPLASH_S + 5.0
+"""Time from loading a level to control: the splash screen, then five seconds of the intro panel."""
+
+HANGING_S: Final = SPLASH_S + 10.0 / 60.0
+"""Time from loading a level to a physical ball: `roller` waits 10 frames, at the nominal 60 frames
+a second, which the splash holds up. Until then nothing moves and nothing happens."""
 
 
 @dataclass(slots=True, eq=False)
@@ -36,11 +43,13 @@ class Controls:
         force_n: (N, 3) mean force on the ball over the step, world frame.
         plate_velocity: (N, P) m/s at which what pulls the plates moves, down is negative.
         gate_velocity: (N, G) likewise of the gates.
+        hanging_s: (N,) time from the step's beginning until the ball is physical, if it is not.
     """
 
     force_n: Float64
     plate_velocity: Float64
     gate_velocity: Float64
+    hanging_s: Float64
 
 
 def anything_moves(state: GameState) -> bool:
@@ -66,6 +75,7 @@ def controls(
         force_n=np.empty((len(key_force_n), 3)),
         plate_velocity=np.zeros(state.plate_struck.shape),
         gate_velocity=np.zeros(state.gate_opening.shape),
+        hanging_s=np.empty(len(key_force_n)),
     )
     _push(
         duration_s,
@@ -74,6 +84,7 @@ def controls(
         state.thrust_s,
         table.pad_force_n,
         result.force_n,
+        result.hanging_s,
     )
     if placement is None:
         return result
@@ -116,9 +127,12 @@ def _push(
     thrust_s: Float64,
     pad_force_n: Float64,
     force_n: Float64,
+    hanging_s: Float64,
 ) -> None:
-    """Write the mean forces of keys and pads over a step, (n, 3)."""
+    """Write the mean forces of keys and pads over a step, (n, 3), and how long balls still hang."""
     for row in range(force_n.shape[0]):
+        # Both delays begin when the level is loaded.
+        hanging_s[row] = max(control_delay_s[row] - (INTRO_S - HANGING_S), 0.0)
         held = min(max(1.0 - control_delay_s[row] / duration_s, 0.0), 1.0)
         lift = 0.0
         for pad in range(thrust_s.shape[1]):
@@ -152,7 +166,6 @@ def apply(state: GameState, table: LevelTable, motion: Motion, events: Events) -
         state.control_delay_s,
     )
     triggers = table.slices[Kind.TRIGGER]
-    state.camera_heading = cameras.follow_heading(state.camera_heading, motion.velocity)
     cameras.move(
         motion.duration_s,
         motion.ball[:, -1],

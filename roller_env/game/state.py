@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.game.cameras import OVERHEAD_WAITS
 from roller_env.game.tables import Kind, LevelTable
 
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
+
+COIN_ON_PANELS: Final = 10
+"""What a coin counts on whatever shows a player how the game stands: the original's `digits` show
+ten times the variable. Rewards, scores and all that programs read count a coin as one."""
 
 
 @dataclass(eq=False)
@@ -31,9 +36,9 @@ class GameState:
         thrust_s: (N, A) how much longer each lift pad pushes the ball up.
         trigger_spent: (N, T) which one-time camera triggers are dead.
         camera_mode: (N,) 0 to 5.
-        camera_delay_s: (N, T) time until each camera trigger sets mode 2; ``inf`` if it will not.
+        camera_delay_s: (N, W) times until mode 2 is set, one for each entry of an overhead trigger
+            that waits, in order; ``inf`` where none does.
         camera_x: (N,) world x of the camera while it retreats (mode 1), metres.
-        camera_heading: (N, 3) unit vector along which the ball last moved, for mode 4.
         waypoint: (N,) index of the next waypoint of the route.
         finished: (N,) the ball has reached the finish and is frozen.
         fallen: (N,) the ball has fallen below the kill height.
@@ -54,7 +59,6 @@ class GameState:
     camera_mode: Int64
     camera_delay_s: Float64
     camera_x: Float64
-    camera_heading: Float64
     waypoint: Int64
     finished: Bool
     fallen: Bool
@@ -69,8 +73,7 @@ class GameState:
         def flags(*shape: int) -> Bool:
             return np.zeros((n, *shape), dtype=bool)
 
-        heading = np.zeros((n, 3))
-        heading[:, 0] = 1.0
+        waits = OVERHEAD_WAITS if table.width(Kind.TRIGGER) else 0
         return GameState(
             steps=np.zeros(n, dtype=np.int64),
             control_delay_s=np.zeros(n),
@@ -83,9 +86,8 @@ class GameState:
             thrust_s=np.zeros((n, table.width(Kind.LIFT_PAD))),
             trigger_spent=flags(table.width(Kind.TRIGGER)),
             camera_mode=np.zeros(n, dtype=np.int64),
-            camera_delay_s=np.full((n, table.width(Kind.TRIGGER)), np.inf),
+            camera_delay_s=np.full((n, waits), np.inf),
             camera_x=np.zeros(n),
-            camera_heading=heading,
             waypoint=np.zeros(n, dtype=np.int64),
             finished=flags(),
             fallen=flags(),

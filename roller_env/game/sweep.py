@@ -34,13 +34,11 @@ class Motion:
     Attributes:
         ball: (N, S + 1, 3) ball centres before the first substep and after each, world frame.
         plate: (N, P) plates' displacements from where they began, at the end, <= 0.
-        velocity: (N, 3) the ball's velocity at the end, world frame.
         duration_s: length of the control step.
     """
 
     ball: Float64
     plate: Float64
-    velocity: Float64
     duration_s: float
 
 
@@ -129,6 +127,23 @@ def find_events(state: GameState, table: LevelTable, motion: Motion) -> Events:
         fallen=fallen,
         end=end,
     )
+
+
+def forget(events: Events, rows: Bool) -> None:
+    """Let nothing have happened in the games where ``rows``, (N,), says so."""
+    events.entry[rows] = np.inf
+    events.end[rows] = np.inf
+    events.points[rows] = 0
+    for happened in (
+        events.inside,
+        events.coins,
+        events.plates,
+        events.pads,
+        events.triggers,
+        events.finished,
+        events.fallen,
+    ):
+        happened[rows] = False
 
 
 def find_entries(

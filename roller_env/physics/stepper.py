@@ -77,6 +77,28 @@ class Stepper:
             path[:, 1:] = self._batch.rollout(self.substeps, record=("qpos",), ids=rows)["qpos"]
         return path
 
+    def advance_late(self, rows: Rows | None, still: Rows) -> Float64:
+        """Advance the worlds as `advance` does, but each only after it has stood still for a while.
+
+        Args:
+            rows: the worlds, or None for all.
+            still: (n,) substeps at the beginning, 0 to S, in which each does not move.
+
+        Returns:
+            (n, S + 1, nq) float64: ``qpos`` as `advance` returns it. Overwritten by the next call.
+        """
+        rows = np.arange(self.num_envs) if rows is None else rows
+        path = self._path[: len(rows)]
+        path[:] = self.qpos[rows][:, None, :]
+        for count in np.unique(still[still < self.substeps]).tolist():
+            late = still == count
+            with profiler_off():
+                moved = self._batch.rollout(
+                    self.substeps - count, record=("qpos",), ids=rows[late]
+                )["qpos"]
+            path[late, count + 1 :] = moved
+        return path
+
     def diverged(self) -> npt.NDArray[np.bool_]:
         """Say which worlds, (N,), MuJoCo has given up on since their last `reset`.
 

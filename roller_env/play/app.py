@@ -309,7 +309,6 @@ class ScreenPlugin(plugin.ViewerPlugin):  # type: ignore[misc]
         view = self.camera.follow(
             int(frame.state.camera_mode[0]),
             qpos[frame.ball : frame.ball + 3],
-            frame.state.camera_heading[0],
             elapsed,
         )
         _copy_camera(viewer.camera, look(view.position, view.target))

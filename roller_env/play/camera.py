@@ -5,7 +5,6 @@ The choice is the picture's, not the simulation's: it lasts until the game itsel
 
 from __future__ import annotations
 
-import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -36,9 +35,6 @@ ORDER: Final = (
 """In which a person goes through the modes. The retreat comes last: it glides from the front to
 behind the ball, where the first mode is; from there it would have nowhere to glide."""
 
-TURNING_TIME_S: Final = 0.12
-"""Time constant of the first-person view's turning: the ball's direction jumps when it bumps."""
-
 
 class View(NamedTuple):
     """Where the camera is and what it looks at, (3,) metres each, world frame."""
@@ -59,7 +55,6 @@ class PlayerCamera:
         self._game_mode = MODE_BEHIND
         self._x = np.zeros(1)
         self._ball = np.zeros((1, 3))
-        self._heading = np.array([[1.0, 0.0, 0.0]])
 
     def reset(self) -> None:
         """Go back behind the ball, as when the level is loaded."""
@@ -69,13 +64,12 @@ class PlayerCamera:
         """Take the next mode of `ORDER`; after the last comes the first."""
         self._enter(ORDER[(ORDER.index(self.mode) + 1) % len(ORDER)])
 
-    def follow(self, game_mode: int, ball: Float64, heading: Float64, duration_s: float) -> View:
+    def follow(self, game_mode: int, ball: Float64, duration_s: float) -> View:
         """Move on for a time and return the view.
 
         Args:
             game_mode: the mode that the game has set.
             ball: (3,) centre of the ball as drawn.
-            heading: (3,) unit vector along which the ball last moved.
             duration_s: since the last call.
         """
         if game_mode != self._game_mode:
@@ -87,21 +81,11 @@ class PlayerCamera:
         mode = np.array([self.mode])
         retreat(mode, self._ball, self._x, duration_s)
         self.mode = int(mode[0])
-        self._turn(heading, duration_s)
         position = camera_position(mode, self._ball, self._x)
-        return View(position[0], camera_target(mode, self._ball, self._heading)[0])
+        return View(position[0], camera_target(mode, self._ball)[0])
 
     def _enter(self, mode: int) -> None:
         """Change the mode; a retreat begins where the camera is."""
         if mode == MODE_RETREAT:
             self._x = camera_position(np.array([self.mode]), self._ball, self._x)[:, 0]
         self.mode = mode
-
-    def _turn(self, heading: Float64, duration_s: float) -> None:
-        if float(self._heading[0] @ heading) < -0.99:
-            # There is no shortest way of turning right round.
-            self._heading = np.array([heading])
-            return
-        share = 1.0 - math.exp(-duration_s / TURNING_TIME_S)
-        turned = self._heading + share * (heading - self._heading)
-        self._heading = turned / np.linalg.norm(turned)

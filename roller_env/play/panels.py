@@ -15,8 +15,9 @@ from typing import Any, Final
 from mujoco.studio.dear_imgui import dear_imgui as imgui
 
 from roller_env.game.cameras import MODES
-from roller_env.game.rules import INTRO_S
-from roller_env.play.session import SPLASH_S, GameFrame
+from roller_env.game.rules import INTRO_S, SPLASH_S
+from roller_env.game.state import COIN_ON_PANELS
+from roller_env.play.session import GameFrame, Result
 
 Rows = Sequence[tuple[str, str]]
 
@@ -86,12 +87,22 @@ class Choice:
 def build_points_gui(frame: GameFrame, camera_mode: int) -> None:
     """Show the points at the top left, always."""
     with panel("points", x=_MARGIN, y=_MARGIN):
-        result = frame.result
-        _text(f"{result.coins} / {result.coins_in_level}", _LARGE_SIZE, _GOLD)
-        detail = f"points   {result.time_s:.1f} s"
-        if camera_mode:
-            detail += f"   camera: {MODES[camera_mode].replace('_', ' ')}"
-        _text(detail, _SMALL_SIZE, _FAINT)
+        points, *details = points_lines(frame.result, camera_mode)
+        _text(points, _LARGE_SIZE, _GOLD)
+        for detail in details:
+            _text(detail, _SMALL_SIZE, _FAINT)
+
+
+def points_lines(result: Result, camera_mode: int) -> list[str]:
+    """Return the lines of the points panel: the points, then what they are and what else counts."""
+    lines = [
+        f"{COIN_ON_PANELS * result.coins}",
+        f"points   {result.time_s:.1f} s",
+        f"{result.coins} of {result.coins_in_level} coins",
+    ]
+    if camera_mode:
+        lines.append(f"camera: {MODES[camera_mode].replace('_', ' ')}")
+    return lines
 
 
 def build_hint_gui() -> None:
@@ -125,7 +136,7 @@ def build_start_gui(frame: GameFrame, choices: Sequence[Choice], chosen: str) ->
 
 
 def build_intro_gui(frame: GameFrame) -> None:
-    """Show the intro panel; in the first second there is only the level."""
+    """Show the intro panel; while the splash has frozen the game there is only the level."""
     if INTRO_S - frame.control_in_s < SPLASH_S:
         return
     with panel("intro", pivot=(0.5, 0.5), y_share=0.3, pad=24.0):
@@ -157,14 +168,7 @@ def build_end_gui(frame: GameFrame, following: Choice | None) -> Wish | None:
     with panel("end", pivot=(0.5, 0.5), pad=28.0):
         title, colour = end_title(frame)
         _text(title, _TITLE_SIZE, colour)
-        _rows(
-            (
-                ("Points", f"{result.coins}"),
-                ("Coins in the level", f"{result.coins_in_level}"),
-                ("Score", f"{result.score_percent:.0f} %"),
-                ("Time", f"{result.time_s:.1f} s"),
-            )
-        )
+        _rows(end_rows(result))
         imgui.Dummy(imgui.Vec2(0.0, 8.0))
         ahead = result.success and following is not None
         if _button("Play again", lit=not ahead, height=44.0) or (not ahead and _enter()):
@@ -174,6 +178,17 @@ def build_end_gui(frame: GameFrame, following: Choice | None) -> Wish | None:
             if _button(label, lit=ahead, height=44.0) or (ahead and _enter()):
                 wish = Wish(Command.CHOOSE_LEVEL, following.name)
     return wish
+
+
+def end_rows(result: Result) -> Rows:
+    """Return what the end panel tells of a game: names and values."""
+    there_were = COIN_ON_PANELS * result.coins_in_level
+    return (
+        ("Points", f"{COIN_ON_PANELS * result.coins} of {there_were}"),
+        ("Coins", f"{result.coins} of {result.coins_in_level}"),
+        ("Score", f"{result.score_percent:.0f} %"),
+        ("Time", f"{result.time_s:.1f} s"),
+    )
 
 
 def end_title(frame: GameFrame) -> tuple[str, Colour]:

@@ -1,10 +1,10 @@
 """PlayScene: a level as MuJoCo Studio draws it.
 
 Studio sends a model to the browser once, and then in every frame only the state of its physics.
-What changes in any other way - coins that turn and vanish, the bands on the tube, the colours that
-tell a state - is therefore made a puppet here: a body without physics (MuJoCo's mocap) that is put
-where it is seen, or away. A piece that changes its material has a puppet for each. The finish's
-particles and the effects change their size, and are sent as loose geoms.
+What changes in any other way - coins that turn and vanish, the bands on tubes and panes, the
+colours that tell a state - is therefore made a puppet here: a body without physics (MuJoCo's mocap)
+that is put where it is seen, or away. A piece that changes its material has a puppet for each. The
+finish's particles and the effects change their size, and are sent as loose geoms.
 
 How everything looks is still decided in one place, `roller_env.drawing.stage`: a stage is kept and
 asked, and no number of it is repeated here.
@@ -33,7 +33,7 @@ Bool = npt.NDArray[np.bool_]
 Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
 
-PUPPETS: Final = ("coin", "ring", "plate", "gate", "pad", "glow", "trigger")
+PUPPETS: Final = ("coin", "ring", "plate", "gate", "pad", "glow", "trigger", "band")
 """Kinds of scenery that change while playing other than by moving with ``qpos``."""
 
 BALL_GROUP: Final = 2

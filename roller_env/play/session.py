@@ -34,9 +34,6 @@ MAX_CATCH_UP_S: Final = 0.1
 """Most game time that one frame may ask for. After a longer stall the game runs slower than the
 clock for that frame: it never jumps, and never asks for more than it can compute."""
 
-SPLASH_S: Final = 1.0
-"""`main` shows the intro panel after a second in which the level is loaded."""
-
 
 class Phase(Enum):
     """What a person's game is doing."""

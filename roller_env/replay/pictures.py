@@ -12,6 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 from roller_env.drawing.canvas import Picture
 from roller_env.drawing.renderer import GameRenderer
 from roller_env.drawing.video import END_S, with_panel, write_video
+from roller_env.level.expand import coin_positions
 from roller_env.replay.contents import Replay
 from roller_env.replay.playback import Playback
 
@@ -125,6 +126,7 @@ def _pictures(
 def _captions(replay: Replay) -> tuple[str, str]:
     level, result = replay.level, replay.result
     played = f"{replay.player or 'unknown player'}, {result.time_s:.1f} s to: {result.outcome}"
-    coins = f"{result.coins} coins ({result.score_percent:.0f} %)"
+    there_were = len(coin_positions(level)[0])
+    coins = f"{result.coins} of {there_were} coins ({result.score_percent:.0f} %)"
     preset = replay.options.physics.name
     return level.title or level.name, f"{played}, {coins}, level {level.name}, physics {preset}"

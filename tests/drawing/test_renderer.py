@@ -187,6 +187,20 @@ def test_a_closed_renderer_can_be_used_again(game: Filmed) -> None:
     renderer.close()
 
 
+def test_one_sees_through_a_wall_as_far_as_its_colours_alpha_says() -> None:
+    """Both of its faces are drawn, and have it together."""
+    seen = []
+    for colour in ("#00000000", "#00000099"):
+        wall = {"at": (-0.5, 0.0, 1.2), "size": (0.1, 8.0, 2.0), "material": "dark"}
+        ground = {"at": (0.0, 0.0, -0.5), "size": (60.0, 40.0, 1.0)}
+        materials = {"dark": {"colour": colour}, "default": {"colour": "#808080"}}
+        game = Game(course(boxes=[ground, wall], materials=materials))
+        renderer = GameRenderer(game.simulation, *SIZE)
+        seen.append(renderer.render(0, MODE_BEHIND)[55:65, 70:90].mean())
+        renderer.close()
+    assert seen[1] / seen[0] == pytest.approx(0.4, abs=0.04)
+
+
 def test_ten_thousand_coins_can_be_drawn() -> None:
     grid = {"centre": (52.0, 0.0, 0.6), "spacing": (1.0, 1.0), "count": (100, 100)}
     ground = {"at": (50.0, 0.0, -0.5), "size": (130.0, 130.0, 1.0), "material": "grey"}

@@ -12,10 +12,10 @@ from PIL import Image
 
 from roller_env.drawing.canvas import Picture
 from roller_env.drawing.overview import render_overview
-from roller_env.drawing.video import END_S, record_episode, with_panel, write_video
+from roller_env.drawing.video import END_S, panel_lines, record_episode, with_panel, write_video
 from roller_env.simulation import Simulation
 from tests.builders import Game
-from tests.drawing.course import course
+from tests.drawing.course import COIN, START, course
 
 
 def frames(count: int) -> list[Picture]:
@@ -56,6 +56,14 @@ def test_a_recorded_episode_shows_every_step_and_stands_still_at_its_end(tmp_pat
     assert simulation.state.truncated[0]
     count, _ = imageio_ffmpeg.count_frames_and_secs(str(file))
     assert count == 1 + 10 + round(END_S * 20)
+
+
+def test_a_coin_counts_ten_points_on_a_films_panel() -> None:
+    game = Game(course(coins=[{"at": START}, {"at": COIN}], time_limit_s=0.1))
+    game.play(0.05)
+    assert panel_lines(game.simulation) == ["10 points   0.1 s", "1 of 2 coins"]
+    game.play(0.05)
+    assert panel_lines(game.simulation)[2] == "time up: 50 %"
 
 
 def test_the_panel_says_how_the_game_stands() -> None:

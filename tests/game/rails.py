@@ -39,10 +39,8 @@ class Rails:
         still = np.zeros_like(self._ball)
         return Placement(self._ball, still, self.plate, self.gate, self.plate, self.gate)
 
-    def follow(self, path: Float64, velocity: Float64 | None = None) -> sweep.Events:
+    def follow(self, path: Float64) -> sweep.Events:
         """Let one control step pass on a path, (N, S + 1, 3) metres; struck plates sink."""
-        if velocity is None:
-            velocity = (path[:, -1] - path[:, -2]) * (path.shape[1] - 1) / self.step_s
         keys = np.zeros((len(path), 2))
         controls = rules.controls(self.state, self.table, keys, self.placement, self.step_s)
         self.plate = np.maximum(
@@ -51,7 +49,7 @@ class Rails:
         self.gate = np.maximum(
             self.gate + controls.gate_velocity * self.step_s, self.table.gate_stop
         )
-        motion = sweep.Motion(path, self.plate, velocity, self.step_s)
+        motion = sweep.Motion(path, self.plate, self.step_s)
         events = sweep.find_events(self.state, self.table, motion)
         rules.apply(self.state, self.table, motion, events)
         self._ball = path[:, -1].copy()

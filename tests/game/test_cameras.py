@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from roller_env.game.cameras import MODES, camera_position, camera_target, follow_heading
+from roller_env.game.cameras import MODES, OVERHEAD_WAITS, camera_position, camera_target
 from roller_env.level import Level
 from tests.builders import Game, make_level, q, resting
 from tests.game.rails import Rails
@@ -59,24 +61,20 @@ def test_a_retreating_camera_is_80_quants_up_at_an_x_of_its_own() -> None:
 
 @pytest.mark.parametrize("number", [0, 1, 2, 3, 5])
 def test_a_camera_looks_at_the_ball(number: int) -> None:
-    ball, heading = np.array([[3.0, -2.0, 5.0]]), np.array([[0.0, 1.0, 0.0]])
-    np.testing.assert_array_equal(camera_target(np.array([number]), ball, heading), ball)
-
-
-def test_the_first_person_camera_looks_along_the_balls_motion() -> None:
     ball = np.array([[3.0, -2.0, 5.0]])
-    heading = follow_heading(np.array([[1.0, 0.0, 0.0]]), np.array([[0.0, -4.0, 3.0]]))
-    eye = camera_position(np.array([FIRST_PERSON]), ball, np.zeros(1))
-    looks = camera_target(np.array([FIRST_PERSON]), ball, heading) - eye
-    np.testing.assert_allclose(looks, [[0.0, -0.8, 0.6]])
+    np.testing.assert_array_equal(camera_target(np.array([number]), ball), ball)
 
 
-def test_the_first_person_camera_keeps_its_direction_when_the_ball_stands() -> None:
-    last = np.array([[0.0, 1.0, 0.0]])
-    for velocity in (0.0, 0.05, 0.1):
-        now = follow_heading(last, np.array([[velocity, 0.0, 0.0]]))
-        np.testing.assert_array_equal(now, last)
-    np.testing.assert_allclose(np.linalg.norm(follow_heading(last, np.array([[0.11, 0, 0]]))), 1.0)
+@pytest.mark.parametrize("keys", ["w", "a", "s", "d"])
+def test_in_first_person_w_stays_forward_wherever_the_ball_rolls(keys: str) -> None:
+    """The picture shows what lies along +x, level, and W pushes along +x."""
+    switch = {"kind": "first_person", "at": resting(), "reach": 0.5}
+    game = Game(make_level(camera_triggers=[switch]))
+    game.play(1.0, keys)
+    assert game.state.camera_mode[0] == FIRST_PERSON
+    ball, number = game.position[None], np.array([FIRST_PERSON])
+    eye = camera_position(number, ball, np.zeros(1))
+    np.testing.assert_allclose(camera_target(number, ball) - eye, [[1.0, 0.0, 0.0]], atol=1e-12)
 
 
 # What sets them -----------------------------------------------------------------------------------
@@ -127,6 +125,61 @@ def test_the_delay_runs_on_when_the_ball_has_left() -> None:
     assert mode(rails) == OVERHEAD
 
 
+def test_an_entry_while_the_overhead_camera_is_still_to_come_counts_too() -> None:
+    """Each entry waits for itself: what was set after the first one's end is set over again."""
+    rails = Rails(level_with(box("overhead", 2.0)))
+    rails.go((2.0, 0.0, 100.0))
+    rails.go(HIGH)
+    rails.wait(0.9)
+    rails.go((2.0, 0.0, 100.0))
+    rails.wait(0.7)
+    assert mode(rails) == OVERHEAD, "1.7 s after the first entry"
+    rails.state.camera_mode[:] = FRONT
+    rails.wait(0.9)
+    assert mode(rails) == FRONT
+    rails.wait(0.1)
+    assert mode(rails) == OVERHEAD, "1.7 s after the second"
+
+
+STEP_S = 0.05
+SOON = st.sampled_from(["", "", "in", "front"])
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(SOON, min_size=1, max_size=160))
+def test_every_entry_sets_the_overhead_camera_after_its_own_wait(moments: list[str]) -> None:
+    """Whatever else sets the camera in between; up to `OVERHEAD_WAITS` entries at once."""
+    rails = Rails(level_with(box("overhead", 2.0), box("overhead", 2.5)), step_s=STEP_S)
+    entries: list[int] = []
+    expected = BEHIND
+    for step, moment in enumerate([*moments, *[""] * 36]):
+        if moment == "front":
+            rails.state.camera_mode[:] = expected = FRONT
+        is_in = moment == "in" and (not entries or step - entries[-1] > 1)
+        waiting = [entry for entry in entries if step - entry < 34]
+        is_in &= len(waiting) < OVERHEAD_WAITS
+        rails.go((2.0, 0.0, 100.0) if is_in else HIGH)
+        # 100 frames are 33 and a third steps.
+        if any(step - entry == 34 for entry in entries):
+            expected = OVERHEAD
+        if is_in:
+            entries.append(step)
+        assert mode(rails) == expected, step
+
+
+def test_more_entries_than_are_kept_still_end_with_the_newest() -> None:
+    rails = Rails(level_with(box("overhead", 2.0)))
+    for _ in range(2 * OVERHEAD_WAITS):
+        rails.go((2.0, 0.0, 100.0))
+        rails.go(HIGH)
+    rails.wait(1.55)
+    rails.state.camera_mode[:] = FRONT
+    rails.wait(0.05)
+    assert mode(rails) == FRONT
+    rails.wait(0.05)
+    assert mode(rails) == OVERHEAD
+
+
 def test_the_retreat_trigger_acts_at_once_and_is_then_dead() -> None:
     rails = Rails(level_with(box("retreat", 2.0)))
     rails.state.camera_mode[:] = FRONT
@@ -164,6 +217,55 @@ def test_the_retreat_ends_sooner_when_the_ball_runs_away() -> None:
     assert mode(rails) == RETREAT
     rails.go((2.0 + 90 * 0.0254, 0.0, 100.0))
     assert mode(rails) == BEHIND
+
+
+BACK_THERE = (-3.0, 0.0, 100.0)
+PAD = {"at": BACK_THERE, "size": (1.0, 1.0, 1.0)}
+SWITCH = {"kind": "first_person", "at": BACK_THERE}
+
+
+@pytest.mark.parametrize(
+    ("triggers", "pads"),
+    [
+        ([box("overhead", -3.0)], []),
+        ([SWITCH], []),
+        ([box("retreat", -3.0)], []),
+        ([], [PAD]),
+    ],
+    ids=["overhead", "first person", "another retreat", "lift pad"],
+)
+def test_nothing_cuts_a_retreat_short_and_it_ends_behind_the_ball(
+    triggers: list[dict[str, Any]], pads: list[dict[str, Any]]
+) -> None:
+    """The original's loop looks at no mode and then sets 0: neither does a lift pad end it."""
+    rails = Rails(level_with(box("retreat", 2.0), *triggers, lift_pads=pads))
+    rails.state.camera_mode[:] = FRONT
+    rails.go((2.0, 0.0, 100.0))
+    x = float(rails.state.camera_x[0])
+    assert mode(rails) == RETREAT
+    rails.go(BACK_THERE)
+    rails.go(HIGH)
+    while mode(rails) == RETREAT:
+        assert rails.time_s < 20.0, "the camera never arrived"
+        rails.wait(rails.step_s)
+    assert mode(rails) == BEHIND
+    glided = x / 0.0254 + 100.0
+    assert rails.time_s == pytest.approx(glided / 16.0, abs=3 * rails.step_s)
+    rails.wait(2.0)
+    assert mode(rails) == BEHIND, "what was set meanwhile is lost"
+
+
+def test_a_first_person_switch_that_the_ball_is_still_in_acts_when_the_retreat_is_over() -> None:
+    """The original's switch sets its mode in every frame."""
+    rails = Rails(level_with(box("retreat", 2.0), SWITCH | {"at": (2.0, 0.0, 100.0)}))
+    rails.state.camera_mode[:] = OVERHEAD
+    rails.go((1.0, 0.0, 100.0))
+    rails.go((1.7, 0.0, 100.0))
+    assert mode(rails) == RETREAT
+    rails.go((2.0, 0.0, 100.0))
+    assert mode(rails) == RETREAT
+    rails.wait(90.0 / 16.0 + 0.2)
+    assert mode(rails) == FIRST_PERSON
 
 
 def first_person_at(x: float) -> Level:

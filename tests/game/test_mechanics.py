@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from roller_env.game.rules import INTRO_S
+from roller_env.game.rules import HANGING_S, INTRO_S
 from roller_env.level import Level
 from roller_env.level.schema import Ball, Gate, LiftPad, Plate
 from tests.builders import BALL_RADIUS_M, GRAVITY, Game, coin, make_level, q, resting
@@ -60,11 +60,52 @@ def test_the_keys_work_six_seconds_after_loading_and_not_before(control_dt_s: fl
     assert game.position[0] == pytest.approx(0.5 * 3.629, rel=0.03)
 
 
-def test_gravity_works_during_the_intro() -> None:
-    game = Game(make_level(start={"at": (0.0, 0.0, 10.0)}))
+@pytest.mark.parametrize("control_dt_s", [1 / 60, 1 / 20, 1 / 8])
+def test_the_ball_hangs_through_the_splash_second_and_ten_frames_and_then_falls(
+    control_dt_s: float,
+) -> None:
+    """However long a step is: it is let go within one."""
+    game = Game(make_level(start={"at": (0.0, 0.0, 10.0)}), control_dt_s)
     game.simulation.reset(intro=True)
-    game.play(3.0)
-    assert game.position[2] == pytest.approx(BALL_RADIUS_M, abs=1e-2)
+    assert math.isclose(HANGING_S, 1.0 + 10 / 60)
+    heights = game.play(2.0)[:, 2]
+    elapsed = control_dt_s * np.arange(1, len(heights) + 1)
+    assert (heights[elapsed <= HANGING_S + 1e-9] == 10.0).all()
+    fall_s = elapsed[-1] - HANGING_S
+    # Euler's steps of 1/240 s are half a step ahead.
+    assert 10.0 - heights[-1] == pytest.approx(GRAVITY * fall_s * (fall_s + 1 / 240) / 2, rel=1e-6)
+    game.play(1.5)
+    assert game.position[2] == pytest.approx(BALL_RADIUS_M, abs=1e-2), "still in the intro"
+
+
+def test_nothing_happens_while_the_ball_hangs() -> None:
+    """No coin is taken and no pad fires, though the ball is in reach of both; then both do."""
+    pad = {"at": q(0, 0, -4), "size": q(64, 64, 8)}
+    floor = {"at": (0.0, 0.0, -2.0), "size": (40.0, 40.0, 3.0)}
+    level = make_level(coins=[coin(*resting())], lift_pads=[pad], boxes=[floor])
+    game = Game(level, control_dt_s=1 / 60)
+    game.simulation.reset(intro=True)
+    game.play(HANGING_S)
+    assert (game.state.points[0], game.state.thrust_s[0, 0]) == (0, 0.0)
+    game.step()
+    assert (game.state.points[0], game.state.thrust_s[0, 0]) == (1, 5.0)
+
+
+def test_games_with_and_without_an_intro_stand_side_by_side() -> None:
+    """A row in its splash hangs, its neighbours play on, each as it would alone."""
+    level = make_level(start={"at": (0.0, 0.0, 3.0), "jitter": (0.5, 0.5)})
+    together, alone = Game(level, num_envs=3), Game(level)
+    together.simulation.reset()
+    together.simulation.reset(np.array([1]), intro=True)
+    starts = [together.simulation.snapshot(np.array([row])) for row in range(3)]
+    paths = []
+    for _ in range(40):
+        together.step("wa")
+        paths.append(together.simulation.ball_position)
+    for row in range(3):
+        alone.simulation.restore(starts[row])
+        path = alone.play(2.0, "wa")
+        np.testing.assert_array_equal(np.array(paths)[:, row], path)
 
 
 def test_without_the_intro_the_keys_work_at_once() -> None:

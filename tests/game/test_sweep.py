@@ -260,7 +260,7 @@ def collect(path: Float64, table: LevelTable, taken: np.ndarray | None = None) -
     if taken is not None:
         state.coin_taken[0] = taken
     plate = np.zeros((1, table.width(Kind.PLATE)))
-    return sweep.find_events(state, table, sweep.Motion(path[None], plate, np.zeros((1, 3)), 0.05))
+    return sweep.find_events(state, table, sweep.Motion(path[None], plate, 0.05))
 
 
 @settings(deadline=None)
@@ -283,7 +283,7 @@ def test_a_game_whose_physics_diverged_meets_nothing() -> None:
     state = GameState.initial(table)
     state.diverged[:] = True
     path = straight((0.0, 0.0, 9.0), COIN_AT)[None]
-    motion = sweep.Motion(path, np.zeros((1, 0)), np.zeros((1, 3)), 0.05)
+    motion = sweep.Motion(path, np.zeros((1, 0)), 0.05)
     events = sweep.find_events(state, table, motion)
     for met in (events.coins, events.triggers, events.inside, events.finished, events.fallen):
         assert not met.any()

@@ -129,6 +129,21 @@ def test_the_bands_run_along_the_tube(hall: Shown) -> None:
     assert hall.place(name) - before == pytest.approx([0.0, 0.0, quants(16.0 * 0.1)])
 
 
+def test_the_bands_run_up_a_retreat_triggers_pane_until_it_is_dead(hall: Shown) -> None:
+    """By 300 quants a second: `camch2` moves its texture by 5 units a frame."""
+    name = part("band", 0, 0) + " band/"
+    hall.show(0.01)
+    before = hall.place(name)
+    hall.show(0.02)
+    assert hall.place(name) - before == pytest.approx([0.0, 0.0, quants(300.0 * 0.01)])
+    for clock_s in np.linspace(0.0, 1.0, 101):
+        hall.show(clock_s)
+        assert abs(hall.place(name)[2] - 1.0) < 1.0, "within the pane"
+    change_state(hall.simulation, trigger_spent=True)
+    hall.show()
+    assert not hall.is_seen(name)
+
+
 def test_puppets_touch_nothing_and_weigh_nothing(hall: Shown) -> None:
     model = hall.scene.model
     for number in range(model.ngeom):
@@ -163,6 +178,7 @@ def test_particles_live_five_eighths_of_a_second_and_fade_and_shrink(hall: Shown
     by_alpha = sorted(geoms, key=lambda geom: float(geom.rgba[3]))
     sizes = [float(geom.size[0]) for geom in by_alpha]
     assert sizes == sorted(sizes)
+    assert 2.0 * sizes[-1] == pytest.approx(quants(20.0), rel=0.05), "20 quants wide at first"
     assert by_alpha[0].rgba[3] < 0.05
     assert by_alpha[-1].rgba[3] > 0.95
 
