@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from roller_env import __version__
+from roller_env.divergence import reports_in
 from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.training.behaviour_cloning import start_from_demonstrations
 from roller_env.training.checkpoint import Progress
@@ -63,7 +64,7 @@ def train(config: TrainingConfig, directory: Path, *, resume: bool = False) -> T
         DemonstrationError: the demonstrations cannot be used.
     """
     files = RunFiles(directory)
-    with only_one_process(directory):
+    with only_one_process(directory), reports_in(directory):
         # Read first: a run is not to be begun with what cannot be learnt from.
         demonstrations = (
             load_demonstrations(config.demonstrations, config)
