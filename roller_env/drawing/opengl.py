@@ -64,7 +64,7 @@ class _Process:
         """Take over from the parent, in the child; only the thread that forked is here."""
         self.lock = threading.RLock()
         self.forked = self.forked or self.reached_for_opengl
-        egl = sys.modules.get("mujoco.egl")
+        egl: Any = sys.modules.get("mujoco.egl")
         if self.forked and egl is not None:
             # Or MuJoCo would terminate the parent's display when this process ends, and wait.
             egl.EGL_DISPLAY = None

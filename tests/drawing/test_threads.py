@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from roller_env.drawing.canvas import Picture
 from roller_env.envs.single import RollerEnv
 
 pytestmark = pytest.mark.usefixtures("opengl")
+
+Elsewhere = Callable[[Callable[[], Any]], Any]
 
 SMALL = {"width": 96, "height": 64}
 
@@ -31,15 +34,13 @@ def picture(env: RollerEnv) -> Picture:
 
 
 @pytest.fixture
-def elsewhere() -> Iterator[Callable[[Callable[[], object]], object]]:
+def elsewhere() -> Iterator[Elsewhere]:
     """Run something in another thread, always the same one, and return its result."""
     with ThreadPoolExecutor(1) as thread:
         yield lambda work: thread.submit(work).result(60.0)
 
 
-def test_an_environment_is_drawn_by_whatever_thread_asks(
-    elsewhere: Callable[[Callable[[], object]], object],
-) -> None:
+def test_an_environment_is_drawn_by_whatever_thread_asks(elsewhere: Elsewhere) -> None:
     env = environment()
     here = picture(env)
     assert np.array_equal(elsewhere(lambda: picture(env)), here)
@@ -47,9 +48,7 @@ def test_an_environment_is_drawn_by_whatever_thread_asks(
     env.close()
 
 
-def test_an_environment_is_closed_by_another_thread_than_has_drawn_it(
-    elsewhere: Callable[[Callable[[], object]], object],
-) -> None:
+def test_an_environment_is_closed_by_another_thread_than_has_drawn_it(elsewhere: Elsewhere) -> None:
     env, other = environment(), environment()
     expected = picture(other)
     elsewhere(lambda: picture(env))
