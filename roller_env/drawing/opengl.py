@@ -63,9 +63,11 @@ class _Process:
     def fork(self) -> None:
         """Take over from the parent, in the child; only the thread that forked is here."""
         self.lock = threading.RLock()
-        self.forked = self.forked or self.reached_for_opengl
         egl: Any = sys.modules.get("mujoco.egl")
-        if self.forked and egl is not None:
+        # By the program's own use of MuJoCo, if not by ours.
+        displayed = egl is not None and egl.EGL_DISPLAY is not None
+        self.forked = self.forked or self.reached_for_opengl or displayed
+        if displayed:
             # Or MuJoCo would terminate the parent's display when this process ends, and wait.
             egl.EGL_DISPLAY = None
 

@@ -88,10 +88,14 @@ def test_the_parent_draws_on(after_drawing: list[str]) -> None:
     assert after_drawing[5:] == ["(48, 64, 3)"]
 
 
-def test_a_process_forked_from_one_that_has_not_drawn_draws() -> None:
-    lines = lines_of("""
+def test_a_process_draws_only_if_the_one_it_was_forked_from_has_not() -> None:
+    drawn, refused, parent = lines_of("""
 env = environment()
 fork(lambda: print(env.render().shape))
+import mujoco.egl
+theirs = mujoco.egl.GLContext(8, 8)  # the program draws something of its own
+fork(lambda: env.render())
 print(env.render().shape)
 """)
-    assert lines == ["(48, 64, 3)", "(48, 64, 3)"]
+    assert drawn == parent == "(48, 64, 3)"
+    assert "forked from one that had drawn" in refused
