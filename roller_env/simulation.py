@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import tempfile
 import warnings
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -15,6 +13,7 @@ import numpy.typing as npt
 from roller_env import checks
 from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.config import MAX_ENVS, EnvConfig
+from roller_env.divergence import report
 from roller_env.game import observations, rewards, rules, sweep
 from roller_env.game.slabs import Placement
 from roller_env.game.state import GameState, score_percent
@@ -469,16 +468,16 @@ class Simulation:
         before: Float64,
         table: LevelTable,
     ) -> None:
-        """Save what diverged, and put those rows' physics back to the start, where it is finite.
+        """Report what diverged, and put those rows' physics back to the start, where it is finite.
 
         Their games are over, so nothing reads the physics but the last observation.
         """
         rows = np.arange(self.num_envs)[every][diverged]
         self.divergences += len(rows)
-        report = _report_divergence(self.compiled, before[diverged], self._stepper.ctrl[rows])
+        kept = report(self.compiled, before[diverged], self._stepper.ctrl[rows])
         warnings.warn(
             f"{len(rows)} game(s) of level {self.compiled.level.name!r} diverged and were ended; "
-            f"the state before is in {report}",
+            f"{kept}",
             RuntimeWarning,
             stacklevel=4,
         )
@@ -625,19 +624,3 @@ class Simulation:
                 f"{self.num_envs - 1}"
             )
         return rows.astype(np.int64)
-
-
-def _report_divergence(compiled: CompiledLevel, state: Float64, ctrl: Float64) -> Path:
-    """Write states before a step that failed, with all that is needed to repeat it."""
-    handle = tempfile.NamedTemporaryFile(  # noqa: SIM115 - the file is to outlive this function
-        prefix=f"roller-diverged-{compiled.level.name}-", suffix=".npz", delete=False
-    )
-    with handle:
-        np.savez_compressed(
-            handle,
-            state=state,
-            ctrl=ctrl,
-            level=np.array(compiled.level.model_dump_json()),
-            preset=np.array(repr(compiled.preset)),
-        )
-    return Path(handle.name)

@@ -15,6 +15,7 @@ from typing import Annotated
 
 import tyro
 
+from roller_env.divergence import reports_in
 from roller_env.level.errors import LevelError
 from roller_env.problems import printable, shown
 from roller_env.training import ConfigError, load_policy
@@ -58,7 +59,8 @@ def main(arguments: Arguments) -> None:
     config = policy.config
     if arguments.level is not None:
         config = config.model_copy(update={"level": arguments.level})
-    evaluation = evaluate_policy(policy, config, arguments.episodes, arguments.seed)
+    with reports_in(arguments.output or arguments.run):
+        evaluation = evaluate_policy(policy, config, arguments.episodes, arguments.seed)
     print(markdown_table(evaluation, config))
     if arguments.replays is not None:
         save_replays(evaluation, config, arguments.replays, f"policy {arguments.run.name}")

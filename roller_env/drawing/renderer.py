@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.drawing.canvas import Canvas, Picture
-from roller_env.drawing.opengl import DrawingUnavailable
+from roller_env.drawing.opengl import DrawingUnavailable, drawing
 from roller_env.drawing.stage import Stage
 from roller_env.game.cameras import (
     MODE_BEHIND,
@@ -45,7 +45,8 @@ SHADOW_PIXELS_SMALL: Final = 1024
 class GameRenderer:
     """Draws games of one simulation. Making one is cheap: OpenGL is asked for at the first picture.
 
-    It reads the simulation and changes nothing in it.
+    It reads the simulation and changes nothing in it. Any thread may ask for a picture, as long as
+    none is stepping the simulation.
     """
 
     def __init__(self, simulation: Simulation, width: int, height: int):
@@ -69,6 +70,10 @@ class GameRenderer:
         Raises:
             DrawingUnavailable: there is no OpenGL here.
         """
+        with drawing():
+            return self._draw(row, camera)
+
+    def _draw(self, row: int, camera: int | Literal["game"]) -> Picture:
         stage, canvas = self._open()
         simulation = self._simulation
         state = simulation.state

@@ -9,10 +9,12 @@ uses only functions and constants of its own module; the rest are its arguments.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar, cast
 
 import numba
+from numba.core import event
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -31,4 +33,38 @@ def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
         return cast("Callable[_P, _R]", numba.njit(cache=True, error_model="numpy")(function))
     except RuntimeError:
         # Nowhere to write: neither beside the package nor in the user's cache directory.
+        _WAIT.kept = False
         return cast("Callable[_P, _R]", numba.njit(error_model="numpy")(function))
+
+
+class _Wait(event.Listener):
+    """Says on the terminal, once a process, what the first step waits for when it has to.
+
+    Numba broadcasts the event when it compiles, and not when it finds what it had compiled before.
+    """
+
+    def __init__(self) -> None:
+        self.said = False
+        self.kept = True
+
+    def on_start(self, event: event.Event) -> None:
+        """Say it, if it is our function that Numba begins with."""
+        module = event.data["dispatcher"].py_func.__module__
+        if self.said or module.partition(".")[0] != __name__.partition(".")[0]:
+            return
+        self.said = True
+        if self.kept:
+            how_often = "once for this machine"
+        else:
+            how_often = (
+                "in every process, since Numba finds no directory to keep them in; set "
+                "NUMBA_CACHE_DIR to one that can be written to"
+            )
+        print(f"Roller: compiling the rules (up to half a minute), {how_often}", file=sys.stderr)
+
+    def on_end(self, event: event.Event) -> None:
+        """Say nothing."""
+
+
+_WAIT = _Wait()
+event.register("numba:compile", _WAIT)  # type: ignore[no-untyped-call]

@@ -7,11 +7,11 @@ is set, and its Python bindings set it with the first ``MjData``; they have no w
 from __future__ import annotations
 
 import ctypes
+import os
 import threading
 from contextlib import AbstractContextManager
-from pathlib import Path
 
-import mujoco
+from roller_env.physics.library import mujoco_library
 
 
 def _timer_callback() -> ctypes.c_void_p | None:
@@ -19,13 +19,11 @@ def _timer_callback() -> ctypes.c_void_p | None:
 
     The profiler then stays on, and all that is lost is time.
     """
-    for library in Path(mujoco.__file__).parent.glob(f"libmujoco*{mujoco.mj_versionString()}*"):
-        try:
-            # Loaded already, so this is a handle of the library that the bindings use.
-            return ctypes.c_void_p.in_dll(ctypes.CDLL(str(library)), "mjcb_time")
-        except (OSError, ValueError):
-            continue
-    return None
+    library = mujoco_library()
+    try:
+        return None if library is None else ctypes.c_void_p.in_dll(library, "mjcb_time")
+    except ValueError:
+        return None
 
 
 class _Switch:
@@ -53,8 +51,16 @@ class _Switch:
             if self._wanted_off == 0:
                 self._callback.value = self._before
 
+    def fork(self) -> None:
+        """Forget, in a forked process, who wanted it off: none of those threads is here."""
+        self._lock = threading.Lock()
+        if self._callback is not None and self._wanted_off:
+            self._callback.value, self._wanted_off = self._before, 0
+
 
 _SWITCH = _Switch()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_SWITCH.fork)
 
 
 def profiler_off() -> AbstractContextManager[None]:

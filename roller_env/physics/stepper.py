@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import os
+from typing import Final
+from weakref import WeakSet
+
 import mujoco
 import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
 
+from roller_env.forks import never_freed
+from roller_env.physics.log_file import no_log_file
 from roller_env.physics.profiler import profiler_off
 
 Float64 = npt.NDArray[np.float64]
@@ -26,6 +32,8 @@ class Stepper:
     """N copies of one model's state, bit-identical to a plain ``mj_step`` loop at any thread count.
 
     Rows are given to its methods as sorted indices without repetition.
+
+    A process forked from this one can go on with the worlds: it gets threads of its own.
 
     Attributes:
         qpos: (N, nq) float64, live view of the positions.
@@ -48,15 +56,19 @@ class Stepper:
         self.model = model
         self.num_envs = num_envs
         self.substeps = substeps
-        self._batch = Batch(model, num_envs, num_threads, persistent=keeps_poses(model))
-        self.qpos: Float64 = self._batch.bind("qpos")
-        self.qvel: Float64 = self._batch.bind("qvel")
+        self._num_threads = num_threads
+        no_log_file()
+        batch = self._new_batch()
+        self._batch: Batch | None = batch
+        self.qpos: Float64 = batch.bind("qpos")
+        self.qvel: Float64 = batch.bind("qvel")
         # MuJoCo cannot bind what a model has none of.
-        self.act: Float64 = self._batch.bind("act") if model.na else np.empty((num_envs, 0))
-        self.ctrl: Float64 = self._batch.bind("ctrl")
-        self.state: Float64 = self._batch.state
+        self.act: Float64 = batch.bind("act") if model.na else np.empty((num_envs, 0))
+        self.ctrl: Float64 = batch.bind("ctrl")
+        self.state: Float64 = batch.state
         self._recorded = np.empty((num_envs, substeps, model.nq))
         self._path = np.empty((num_envs, substeps + 1, model.nq))
+        _STEPPERS.add(self)
 
     def advance(self, rows: Rows | None = None) -> Float64:
         """Advance the worlds ``rows`` (all, if None) and return where they went.
@@ -65,16 +77,19 @@ class Stepper:
             (n, S + 1, nq) float64: ``qpos`` before the first substep and after each. Overwritten
             by the next call.
         """
+        batch = self._ready_batch()
         if rows is None:
-            self._path[:, 0] = self.qpos
+            path = self._path
+            path[:, 0] = self.qpos
             with profiler_off():
-                self._batch.rollout(self.substeps, record=("qpos",), out={"qpos": self._recorded})
-            self._path[:, 1:] = self._recorded
-            return self._path
-        path = self._path[: len(rows)]
-        path[:, 0] = self.qpos[rows]
-        with profiler_off():
-            path[:, 1:] = self._batch.rollout(self.substeps, record=("qpos",), ids=rows)["qpos"]
+                batch.rollout(self.substeps, record=("qpos",), out={"qpos": self._recorded})
+            path[:, 1:] = self._recorded
+        else:
+            path = self._path[: len(rows)]
+            path[:, 0] = self.qpos[rows]
+            with profiler_off():
+                path[:, 1:] = batch.rollout(self.substeps, record=("qpos",), ids=rows)["qpos"]
+        self._show_state(batch)
         return path
 
     def advance_late(self, rows: Rows | None, still: Rows) -> Float64:
@@ -87,16 +102,16 @@ class Stepper:
         Returns:
             (n, S + 1, nq) float64: ``qpos`` as `advance` returns it. Overwritten by the next call.
         """
+        batch = self._ready_batch()
         rows = np.arange(self.num_envs) if rows is None else rows
         path = self._path[: len(rows)]
         path[:] = self.qpos[rows][:, None, :]
         for count in np.unique(still[still < self.substeps]).tolist():
             late = still == count
             with profiler_off():
-                moved = self._batch.rollout(
-                    self.substeps - count, record=("qpos",), ids=rows[late]
-                )["qpos"]
-            path[late, count + 1 :] = moved
+                moved = batch.rollout(self.substeps - count, record=("qpos",), ids=rows[late])
+            path[late, count + 1 :] = moved["qpos"]
+        self._show_state(batch)
         return path
 
     def diverged(self) -> npt.NDArray[np.bool_]:
@@ -104,12 +119,14 @@ class Stepper:
 
         A world of which MuJoCo warned, of whatever, no longer moves.
         """
-        bad: npt.NDArray[np.bool_] = (self._batch.warning[:, :, 1] > 0).any(axis=1)
+        bad: npt.NDArray[np.bool_] = (self._ready_batch().warning[:, :, 1] > 0).any(axis=1)
         return bad
 
     def reset(self, rows: Rows) -> None:
         """Put the worlds ``rows`` back to the model's initial state and forget their warnings."""
-        self._batch.reset(rows, stage=mujoco.mjtStage.mjSTAGE_NONE)
+        batch = self._ready_batch()
+        batch.reset(rows, stage=mujoco.mjtStage.mjSTAGE_NONE)
+        self._show_state(batch)
 
     def rays(
         self, origins: Float64, directions: Float64, exclude_body: int, rows: Rows | None = None
@@ -125,5 +142,46 @@ class Stepper:
         Returns:
             Distances; ``inf`` where a ray meets nothing.
         """
-        distance, _ = self._batch.ray(origins, directions, bodyexclude=exclude_body, ids=rows)
+        batch = self._ready_batch()
+        distance, _ = batch.ray(origins, directions, bodyexclude=exclude_body, ids=rows)
         return np.where(distance < 0.0, np.inf, distance)
+
+    def leave_threads_behind(self) -> None:
+        """Go on, in a forked process, without the parent's threads, which are not here.
+
+        The views stay where they are, in memory that the parent's batch had; the batch that is
+        made when it is first needed has a state of its own, which is copied to them and from them.
+        """
+        if self._batch is not None and self._batch.nthread > 1:
+            never_freed(self._batch)
+            self._batch = None
+
+    def _new_batch(self) -> Batch:
+        return Batch(
+            self.model, self.num_envs, self._num_threads, persistent=keeps_poses(self.model)
+        )
+
+    def _ready_batch(self) -> Batch:
+        """Return the batch, in the state that the views show."""
+        if self._batch is None:
+            self._batch = self._new_batch()
+        if self._batch.state is not self.state:
+            self._batch.state[:] = self.state
+        return self._batch
+
+    def _show_state(self, batch: Batch) -> None:
+        """Let the views show the batch's state."""
+        if batch.state is not self.state:
+            self.state[:] = batch.state
+
+
+_STEPPERS: Final[WeakSet[Stepper]] = WeakSet()
+
+
+def _leave_threads_behind() -> None:
+    for stepper in list(_STEPPERS):
+        stepper.leave_threads_behind()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_leave_threads_behind)

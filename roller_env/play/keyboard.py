@@ -8,6 +8,7 @@ from typing import Any, Final
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
+from gymnasium.utils import RecordConstructorArgs
 
 from roller_env.envs.spaces import action_of_keys
 from roller_env.game.actions import KEYS
@@ -52,10 +53,11 @@ def letters(keys: Iterable[str]) -> str:
     return "".join(key for key in KEYS if key in stand_for)
 
 
-class KeyboardWrapper(gym.ActionWrapper[Any, Any, Any]):
+class KeyboardWrapper(gym.ActionWrapper[Any, Any, Any], RecordConstructorArgs):
     """Held keys go in as W, A, S, D; the environment's own actions come out, whatever their mode.
 
-    Observations, rewards and infos are not touched. ``action_space`` is MultiBinary(4).
+    Observations, rewards and infos are not touched. ``action_space`` is MultiBinary(4). It is part
+    of the wrapped environment's ``spec``, so that ``gym.make(env.spec)`` wraps again.
     """
 
     def __init__(self, env: gym.Env[Any, Any]):
@@ -64,7 +66,8 @@ class KeyboardWrapper(gym.ActionWrapper[Any, Any, Any]):
         Raises:
             ValueError: it has no W, A, S, D.
         """
-        super().__init__(env)
+        RecordConstructorArgs.__init__(self)
+        gym.ActionWrapper.__init__(self, env)
         config = getattr(env.unwrapped, "config", None)
         if config is None or not hasattr(config, "action"):
             raise ValueError(

@@ -15,6 +15,7 @@ from typing import Any, Final
 from pydantic_core import from_json
 
 from roller_env import __version__
+from roller_env.divergence import reports_in
 from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.problems import shown
 from roller_env.training.behaviour_cloning import start_from_demonstrations
@@ -83,7 +84,7 @@ def train(config: TrainingConfig, directory: Path, *, resume: bool = False) -> T
         if config.demonstrations is not None:
             demonstrations = load_demonstrations(config.demonstrations, config)
     try:
-        with only_one_process(directory):
+        with only_one_process(directory), reports_in(directory):
             return _train(config, files, demonstrations, resume)
     except OSError as error:
         raise RunError(_unwritable(error, files)) from error

@@ -14,7 +14,6 @@ from gymnasium.vector import AutoresetMode
 
 from roller_env import ENV_IDS
 from roller_env.config import EnvConfig, make_config
-from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.envs.single import RollerEnv
 from roller_env.envs.vector import RollerVectorEnv
 from roller_env.game.rewards import RewardWeights
@@ -40,7 +39,6 @@ def test_any_level_is_made_from_its_name_its_path_or_itself(kind: str) -> None:
     source = {"name": "lift", "string": str(path), "path": path, "level": load_level("lift")}[kind]
     assert level_of(gym.make("Roller/Level-v0", level=source)) == "lift"
     assert level_of(gym.make_vec("Roller/Level-v0", 2, level=source)) == "lift"
-    assert RollerVecEnv(source, 2).level.name == "lift"
 
 
 @pytest.mark.parametrize("mode", AutoresetMode)
@@ -172,7 +170,6 @@ def makers(options: dict[str, Any]) -> list[Callable[[], Any]]:
     ways: list[Callable[[], Any]] = [
         lambda: RollerEnv(**options),
         lambda: RollerVectorEnv(2, **options),
-        lambda: RollerVecEnv(num_envs=2, **options),
         lambda: gym.make_vec("Roller/Level-v0", 2, **options),
     ]
     if "render_mode" not in options and "max_episode_steps" not in options:
@@ -189,9 +186,8 @@ def test_a_weight_that_is_no_finite_number_is_refused(name: str, value: Any) -> 
 
 @pytest.mark.parametrize("num_envs", [0, -1, 2.0, "2", True])
 def test_a_number_of_games_that_is_none_is_refused(num_envs: Any) -> None:
-    for make in (lambda: RollerVectorEnv(num_envs), lambda: RollerVecEnv("flat", num_envs)):
-        with pytest.raises(ValueError, match=r"num_envs: found .*; must be"):
-            make()
+    with pytest.raises(ValueError, match=r"num_envs: found .*; must be"):
+        RollerVectorEnv(num_envs)
 
 
 def test_numpys_numbers_are_numbers_in_every_option() -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import threading
+
 import mujoco
 import pytest
 
@@ -56,3 +59,36 @@ def test_two_games_that_step_at_once_leave_the_profiler_as_it_was() -> None:
     second.__exit__(None, None, None)
     mujoco.mj_step(model, data)
     assert time_taken(data) > 0.0
+
+
+@pytest.mark.skipif(
+    "fork" not in multiprocessing.get_all_start_methods(), reason="nothing forks here"
+)
+def test_a_process_forked_while_another_thread_steps_is_timed_as_ever() -> None:
+    model, stepping, done = falling_ball(), threading.Event(), threading.Event()
+
+    def step() -> None:
+        with profiler_off():
+            stepping.set()
+            done.wait()
+
+    def child() -> None:
+        data = mujoco.MjData(model)
+        mujoco.mj_step(model, data, 10)
+        untimed = time_taken(data) == 0.0
+        with profiler_off():
+            mujoco.mj_step(model, data)
+        answer.put(untimed)
+
+    context = multiprocessing.get_context("fork")
+    answer = context.SimpleQueue()
+    thread = threading.Thread(target=step)
+    thread.start()
+    stepping.wait()
+    process = context.Process(target=child)
+    process.start()
+    process.join(60.0)
+    done.set()
+    thread.join()
+    assert process.exitcode == 0
+    assert not answer.get()

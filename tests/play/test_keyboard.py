@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import os
+import warnings
 from typing import Any, get_args
 
 import gymnasium as gym
 import numpy as np
 import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils import env_checker
 from hypothesis import given
 from hypothesis import strategies as st
 
 from roller_env.envs.single import RollerEnv
 from roller_env.game.actions import KEY_AXES, KEYS, ActionMode, forces
 from roller_env.play.keyboard import ARROWS, Keyboard, KeyboardWrapper, letters
+from tests.envs.checking import no_warnings_but_of_unbounded_observations
 
 KEY_N = 5.08
 MODES = get_args(ActionMode)
@@ -74,6 +78,28 @@ def test_what_is_no_key_is_refused(wrong: Any) -> None:
 def test_an_environment_of_another_kind_is_refused() -> None:
     with pytest.raises(ValueError, match="KeyboardWrapper: found"):
         KeyboardWrapper(gym.make("CartPole-v1"))
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("kept", ["as it is", "as JSON"])
+def test_a_wrapped_environment_is_made_again_from_its_spec(kept: str, mode: Any) -> None:
+    env = wrapped(mode)
+    assert env.spec is not None
+    spec = env.spec if kept == "as it is" else EnvSpec.from_json(env.spec.to_json())
+    again = gym.make(spec)
+    assert isinstance(again, KeyboardWrapper)
+    assert again.spec == env.spec
+    assert np.array_equal(env.reset(seed=5)[0], again.reset(seed=5)[0])
+    for held in ([1, 0, 0, 0], [1, 0, 0, 1], [0, 0, 0, 0]):
+        assert np.array_equal(env.step(held)[0], again.step(held)[0])
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_gymnasiums_checker_finds_nothing_wrong_with_a_wrapped_environment(mode: Any) -> None:
+    with no_warnings_but_of_unbounded_observations():
+        # The checker would rather have the bare environment, which `tests.envs` gives it.
+        warnings.filterwarnings("ignore", message=".*is different from the unwrapped version.*")
+        env_checker.check_env(wrapped(mode), skip_render_check=True)
 
 
 @given(st.lists(st.tuples(st.booleans(), st.sampled_from(NAMES)), max_size=30))

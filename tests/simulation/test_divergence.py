@@ -1,7 +1,11 @@
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +15,7 @@ import pytest
 
 from roller_env.compile.compiled import compile_level
 from roller_env.config import EnvConfig
+from roller_env.divergence import MOST_REPORTS, REPORTS_VARIABLE, reports_in
 from roller_env.level import Level
 from roller_env.simulation import Simulation, Transition
 from tests.builders import coin, make_level, resting
@@ -26,11 +31,15 @@ POISONS = {
 
 
 @pytest.fixture(autouse=True)
-def reports(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The directory that reports of divergence are written to."""
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log where it runs
-    return tmp_path
+def reports(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The directory that reports of divergence are asked for in; nothing is written elsewhere."""
+    elsewhere, directory = tmp_path / "elsewhere", tmp_path / "reports"
+    elsewhere.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(elsewhere))
+    monkeypatch.chdir(elsewhere)
+    monkeypatch.setenv(REPORTS_VARIABLE, str(directory))
+    yield directory
+    assert list(elsewhere.iterdir()) == []
 
 
 def poison(simulation: Simulation, row: int, kind: str = "nan_velocity") -> None:
@@ -139,4 +148,80 @@ def test_a_simulation_that_never_diverged_writes_nothing(reports: Path) -> None:
     simulation.reset()
     for force, _ in zip(wandering(2), range(20), strict=False):
         simulation.step(force)
-    assert (simulation.divergences, list(reports.iterdir())) == (0, [])
+    assert (simulation.divergences, reports.exists()) == (0, False)
+
+
+def diverge_once() -> str:
+    """Let a game diverge; return what is said of its state."""
+    simulation = simulation_of("bridge")
+    poison(simulation, row=0)
+    with pytest.warns(RuntimeWarning) as caught:
+        simulation.step(np.zeros((1, 2)))
+    return str(caught[0].message).partition("ended; ")[2]
+
+
+def test_nobody_who_did_not_ask_for_reports_gets_a_file(
+    reports: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv(REPORTS_VARIABLE)
+    assert diverge_once() == "ROLLER_REPORTS=DIRECTORY would keep the state before"
+    assert not reports.exists()
+
+
+def test_a_level_that_always_diverges_leaves_a_stated_number_of_reports(reports: Path) -> None:
+    said = [diverge_once() for _ in range(MOST_REPORTS + 3)]
+    kept = sorted(reports.iterdir())
+    assert len(kept) == MOST_REPORTS
+    assert sorted(line.rpartition(" ")[2] for line in said[:MOST_REPORTS]) == list(map(str, kept))
+    assert set(said[MOST_REPORTS:]) == {f"{reports} has its {MOST_REPORTS} reports already"}
+
+
+def test_a_report_that_cannot_be_written_is_said_and_the_game_ends_all_the_same(
+    reports: Path,
+) -> None:
+    reports.write_text("a file where the directory should be")
+    assert diverge_once().startswith("the state before could not be kept: ")
+
+
+def test_a_run_keeps_its_reports_beside_its_other_files_and_no_longer_than_it_lasts(
+    reports: Path,
+) -> None:
+    run = reports.parent / "run"
+    with reports_in(run):
+        diverge_once()
+    assert [file.name for file in run.iterdir()] == ["diverged-1.npz"]
+    assert not reports.exists()
+    diverge_once()
+    assert len(list(reports.iterdir())) == len(list(run.iterdir())) == 1
+
+
+DIVERGE = """
+import numpy as np, sys
+from roller_env.config import EnvConfig
+from roller_env.simulation import Simulation
+simulation = Simulation(EnvConfig(level="flat", num_threads=int(sys.argv[1])), 4)
+simulation.reset()
+snapshot = simulation.snapshot()
+snapshot.physics[:, 1] = np.nan
+simulation.restore(snapshot)
+simulation.step(np.zeros((4, 2)))
+"""
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_mujoco_leaves_no_log_file_where_the_user_works(threads: int, tmp_path: Path) -> None:
+    directory = tmp_path / "work"
+    directory.mkdir()
+    root = str(Path(__file__).parents[2])
+    done = subprocess.run(
+        [sys.executable, "-c", DIVERGE, str(threads)],
+        cwd=directory,
+        env=os.environ | {"PYTHONPATH": root},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert "4 game(s) of level 'flat' diverged" in done.stderr
+    assert "WARNING: Nan" in done.stderr, "what MuJoCo says on the terminal is not lost"
+    assert list(directory.iterdir()) == []

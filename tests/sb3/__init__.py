@@ -1,0 +1,1 @@
+"""What needs the extra ``train``: `tests.envs` is collected and passes without it."""

@@ -1,0 +1,34 @@
+"""`RollerVecEnv` is made, and refused, as Gymnasium's vector of the same games is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from roller_env.envs.sb3 import RollerVecEnv
+from roller_env.level import load_level
+from roller_env.level.load import levels_directory
+from tests.envs.test_making import BAD
+
+
+@pytest.mark.parametrize("kind", ["name", "string", "path", "level"])
+def test_any_level_is_made_from_its_name_its_path_or_itself(kind: str) -> None:
+    path = levels_directory() / "lift.yaml"
+    source = {"name": "lift", "string": str(path), "path": path, "level": load_level("lift")}[kind]
+    assert RollerVecEnv(source, 2).level.name == "lift"
+
+
+@pytest.mark.parametrize(("options", "says"), BAD, ids=lambda value: str(value)[:40])
+def test_a_bad_option_is_one_error_that_says_what_and_what_would_be_right(
+    options: dict[str, Any], says: str
+) -> None:
+    with pytest.raises(ValueError, match=says) as caught:
+        RollerVecEnv(num_envs=2, **options)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("num_envs", [0, -1, 2.0, "2", True])
+def test_a_number_of_games_that_is_none_is_refused(num_envs: Any) -> None:
+    with pytest.raises(ValueError, match=r"num_envs: found .*; must be"):
+        RollerVecEnv("flat", num_envs)
