@@ -1,10 +1,11 @@
-"""Verify a replay bit for bit, show it in the browser, or render it.
+"""Verify a replay bit for bit, show it in the browser, render it, or convert an old one.
 
 Examples::
 
     python scripts/replay.py assets/replays/classic.replay
     python scripts/replay.py classic --show
     python scripts/replay.py mine.replay --video mine.mp4 --sheet mine.png
+    python scripts/replay.py old.replay --convert new.replay
 """
 
 from __future__ import annotations
@@ -18,7 +19,15 @@ import tyro
 
 from roller_env.drawing.opengl import DrawingUnavailable
 from roller_env.game.cameras import MODES
-from roller_env.replay import Replay, ReplayError, load_replay, shipped_replays, verify
+from roller_env.replay import (
+    Replay,
+    ReplayError,
+    load_replay,
+    save_replay,
+    shipped_replays,
+    verify,
+)
+from roller_env.replay.conversion import load_any, record_anew
 from roller_env.replay.pictures import contact_sheet, film
 
 _SHEET_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
@@ -50,6 +59,10 @@ class Arguments:
     sheet: Path | None = None
     """Draw moments of it on one sheet, a .png."""
 
+    convert: Path | None = None
+    """Play a replay, also one of an older format, again here, and write a new file of it if it ends
+    as it did."""
+
     camera: Literal["game"] | int = "game"
     """As the game's triggers set it, or a mode 0 to 5 for good."""
 
@@ -64,10 +77,17 @@ def main(arguments: Arguments) -> int:
     if arguments.file not in shipped and not Path(arguments.file).exists():
         known = ", ".join(shipped)
         raise ReplayError(f"{arguments.file}: there is no such file; shipped are {known}")
-    replay = load_replay(shipped.get(arguments.file, Path(arguments.file)))
+    file = shipped.get(arguments.file, Path(arguments.file))
+    if arguments.convert is not None:
+        replay = record_anew(load_any(file))
+        print(f"written to {save_replay(replay, arguments.convert)}")
+    else:
+        replay = load_replay(file)
     print(_about(replay))
     status = 0
-    if arguments.verify or not (arguments.show or arguments.video or arguments.sheet):
+    if arguments.verify or not (
+        arguments.show or arguments.video or arguments.sheet or arguments.convert
+    ):
         verification = verify(replay)
         print(verification)
         status = 0 if verification.is_exact else 1
@@ -100,6 +120,8 @@ def _check(arguments: Arguments) -> None:
     ):
         if path is not None and path.suffix.lower() not in suffixes:
             raise ReplayError(f"{path}: the name must end in {' or '.join(suffixes)}")
+    if arguments.convert is not None and arguments.convert.exists():
+        raise ReplayError(f"{arguments.convert}: there is such a file, which is not overwritten")
     if arguments.camera != "game" and arguments.camera not in range(len(MODES)):
         raise ReplayError(f"camera: found {arguments.camera}; allowed are game and 0 to 5")
     if any(edge % 2 or not 16 <= edge <= 4096 for edge in arguments.size):

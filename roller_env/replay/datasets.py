@@ -20,7 +20,8 @@ from roller_env.envs.spaces import action_space, observation_space
 from roller_env.game.rewards import RewardWeights
 from roller_env.level import load_level
 from roller_env.physics.presets import PRESETS, PhysicsPreset
-from roller_env.replay.contents import Replay, ReplayError
+from roller_env.replay.contents import Replay
+from roller_env.replay.errors import ReplayError
 from roller_env.replay.experience import Experience, experiences
 
 if TYPE_CHECKING:

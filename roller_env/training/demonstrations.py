@@ -18,7 +18,8 @@ from roller_env.game.actions import ActionMode, forces
 from roller_env.game.rewards import RewardWeights
 from roller_env.level import load_level
 from roller_env.replay import Replay, ReplayError, load_replay
-from roller_env.replay.experience import Experience, actions_of, experiences
+from roller_env.replay.actions import actions_of
+from roller_env.replay.experience import Experience, experiences
 from roller_env.replay.file import SUFFIX
 from roller_env.replay.scripted import PLAYER, meant
 from roller_env.training.config import TrainingConfig
