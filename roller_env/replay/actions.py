@@ -70,7 +70,8 @@ def checked_actions(mode: ActionMode, actions: npt.ArrayLike) -> Actions:
         )
     low, high = _RANGES[mode]
     # NaN is outside too.
-    outside = ~((array >= low) & (array <= high)).reshape(len(array), -1).all(axis=1)
+    inside = (array >= low) & (array <= high)
+    outside = ~inside.all(axis=tuple(range(1, array.ndim)))
     _refuse(mode, outside, array, f"{low} to {high}")
     if mode != "force":
         return array.astype(np.int64 if mode == "directions" else np.int8)

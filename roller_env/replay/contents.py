@@ -111,7 +111,7 @@ class Versions(_Frozen):
         """Return ``name mine, not theirs`` of all in which the two differ."""
         mine, theirs = self.model_dump(), other.model_dump()
         return tuple(
-            f"{name} {mine[name] or 'unknown'}, not {theirs[name] or 'unknown'}"
+            f"{name} {str(mine[name]) or 'unknown'}, not {str(theirs[name]) or 'unknown'}"
             for name in mine
             if mine[name] != theirs[name]
         )

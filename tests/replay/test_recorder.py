@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
 from roller_env.envs.single import RollerEnv
 from roller_env.envs.vector import RollerVectorEnv
-from roller_env.game.actions import forces
+from roller_env.game.actions import ActionMode, forces
 from roller_env.game.rules import INTRO_S
 from roller_env.level import shipped_levels
-from roller_env.replay import Recorder, replays_of, verify
+from roller_env.replay import Recorder, ReplayError, replays_of, verify
 from tests.builders import make_level
-from tests.replay.recording import same, straight_on, wandered
+from tests.replay.recording import pushed_otherwise, same, straight_on, wandered
 from tests.simulation.driving import simulation_of, wandering
 
 
@@ -30,16 +28,24 @@ def test_a_game_of_any_level_is_the_same_when_played_again(level: str, reward: s
 
 
 @pytest.mark.parametrize("physics", ["default", "accurate"])
-@pytest.mark.parametrize("action", ["keys", "force"])
-def test_any_preset_and_any_force_are_on_record(physics: str, action: str) -> None:
+@pytest.mark.parametrize("action", ["directions", "keys", "force"])
+def test_any_preset_and_any_action_are_on_record(physics: str, action: ActionMode) -> None:
     rng = np.random.default_rng(1)
     simulation = simulation_of("gate", physics=physics, action=action, num_threads=1)
     recorder = Recorder(simulation)
     recorder.begin()
-    for _ in range(60):
-        force = rng.uniform(-5.0, 5.0, (1, 2))
+    actions = {
+        "directions": rng.integers(9, size=60),
+        "keys": rng.integers(2, size=(60, 4)),
+        "force": rng.uniform(-1.0, 1.0, (60, 2)).astype(np.float32),
+    }[action]
+    for done in actions:
+        force = forces(action, done[None])
         recorder.record(force, simulation.step(force).reward)
     played = recorder.replay()
+    if action != "keys":  # Opposite keys cancel, and are then as if neither was held.
+        assert np.array_equal(played.actions, actions)
+    assert np.array_equal(played.force_n, forces(action, actions))
     assert verify(played).is_exact
     assert played.result.outcome == "not ended"
     assert played.options.physics.name == physics
@@ -146,20 +152,47 @@ def test_no_games_are_no_replays() -> None:
 
 
 def test_a_game_whose_physics_fails_is_on_record_to_its_end() -> None:
-    level = make_level(gravity=0.001, ball={"mass_kg": 0.001}, time_limit_s=20.0)
-    simulation = simulation_of(level, num_threads=1, action="force")
-    recorder = Recorder(simulation)
-    recorder.begin()
-    for force in np.zeros((1, 2)), np.full((1, 2), 1e30):
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            recorder.record(force, simulation.step(force).reward)
-    assert "diverged" in str(caught[-1].message)
-    played = recorder.replay()
+    # So strong a pad throws so light a ball further than MuJoCo counts.
+    pad = {"at": [0.0, 0.0, 0.1], "size": [2.0, 2.0, 0.2], "force_n": 1e6}
+    start = {"at": (0.0, 0.0, 0.7)}
+    level = make_level(start=start, ball={"mass_kg": 0.001}, lift_pads=[pad], time_limit_s=20.0)
+    with pytest.warns(RuntimeWarning, match="diverged"):
+        played = straight_on(level, 150, direction=0, physics="fast")
     assert played.result.diverged
-    assert len(played) == 2
+    assert 50 < len(played) < 150
     with pytest.warns(RuntimeWarning, match="diverged"):
         assert verify(played).is_exact
+
+
+def test_a_force_that_nobody_can_make_is_not_put_on_record() -> None:
+    for action, newtons in (("directions", 2.0), ("keys", 200.0), ("force", 1e308)):
+        simulation = simulation_of("flat", physics="fast", action=action)
+        recorder = Recorder(simulation)
+        recorder.begin()
+        reward = simulation.step(np.zeros((1, 2))).reward
+        recorder.record(np.array([[newtons, 0.0]]), reward)
+        with pytest.raises(ReplayError, match=f"step 0, .* is no action of mode '{action}'"):
+            recorder.replay()
+
+
+@pytest.mark.parametrize("steps", [0, 1, 9, 10, 11, 20])
+def test_the_beginning_and_the_end_have_checksums_however_long_it_is(steps: int) -> None:
+    played = straight_on("flat", steps, physics="fast")
+    assert played.checksums.every == 10
+    assert len(played.checksums.table) == len({*range(0, steps, 10), 0, steps})
+    assert verify(played).is_exact
+    assert steps == 0 or not verify(pushed_otherwise(played, steps - 1)).is_exact
+
+
+def test_a_game_that_was_reset_meanwhile_is_not_passed_off_as_the_one_on_record() -> None:
+    simulation = simulation_of("flat", physics="fast")
+    recorder = Recorder(simulation)
+    recorder.begin()
+    force = forces("directions", [1])
+    recorder.record(force, simulation.step(force).reward)
+    simulation.reset()
+    with pytest.raises(ValueError, match="found it at step 0 after 1 recorded"):
+        recorder.replay()
 
 
 def test_a_recording_begins_at_a_beginning() -> None:

@@ -35,7 +35,7 @@ def test_a_replay_is_verified_unless_something_else_is_asked_for(tmp_path: Path)
     assert f"the same bit for bit over {len(played)} steps" in output
     status, output, _ = run(save_replay(pushed_otherwise(played, 8), tmp_path / "other.replay"))
     assert status == 1
-    assert "parts at step 9 of" in output
+    assert "another game at step 10 of" in output
 
 
 @pytest.mark.parametrize(
