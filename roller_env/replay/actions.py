@@ -71,7 +71,7 @@ def checked_actions(mode: ActionMode, actions: npt.ArrayLike) -> Actions:
     low, high = _RANGES[mode]
     # NaN is outside too.
     inside = (array >= low) & (array <= high)
-    outside = ~inside.all(axis=tuple(range(1, array.ndim)))
+    outside = np.logical_not(inside.all(axis=tuple(range(1, array.ndim))))
     _refuse(mode, outside, array, f"{low} to {high}")
     if mode != "force":
         return array.astype(np.int64 if mode == "directions" else np.int8)

@@ -59,7 +59,7 @@ def checksums(simulation: Simulation, rows: Int64, names: Sequence[str]) -> UInt
     table = np.empty((len(rows), len(names)), dtype=np.uint32)
     for column, name in enumerate(names):
         values = np.ascontiguousarray(QUANTITIES[name](simulation)[rows], dtype="<f8")
-        table[:, column] = [zlib.crc32(row) for row in values.reshape(len(rows), -1)]
+        table[:, column] = [zlib.crc32(row.data) for row in values.reshape(len(rows), -1)]
     return table
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import platform
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from importlib.metadata import version
 from typing import Annotated, Any, Final, Literal
 
@@ -42,7 +42,6 @@ _MAX_SOLVER_ITERATIONS: Final = 1000
 
 MAX_TEXT: Final = 200
 """Characters of a name in a replay."""
-
 
 
 def _printable(text: str) -> str:
@@ -91,6 +90,7 @@ class Versions(_Frozen):
     libc: Text
 
     @staticmethod
+    @cache
     def here(engine: Engine = "mujoco") -> Versions:
         """Return what is installed here."""
         return Versions(

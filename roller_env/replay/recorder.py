@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -30,7 +31,8 @@ class _Take:
     start: tuple[float, float, float]
     intro: bool
     seed: int | None
-    forces: list[tuple[float, float]] = field(default_factory=list)
+    steps: int = 0
+    forces: array[float] = field(default_factory=lambda: array("d"))
     checksums: list[UInt32] = field(default_factory=list)
     total_reward: float = 0.0
 
@@ -96,18 +98,18 @@ class Recorder:
             ValueError: a row was reset or stepped meanwhile without the recorder being told.
         """
         steps = self._simulation.state.steps
-        made = [row for row, take in self._takes.items() if steps[row] != len(take.forces)]
+        made = [row for row, take in self._takes.items() if steps[row] != take.steps]
         if not made:
             return
         for row in made:
             take = self._takes[row]
-            if steps[row] != len(take.forces) + 1:
+            if steps[row] != take.steps + 1:
                 raise ValueError(
-                    f"row {row}: found it at step {steps[row]} after {len(take.forces)} recorded; "
+                    f"row {row}: found it at step {steps[row]} after {take.steps} recorded; "
                     "tell the recorder of every step and every reset"
                 )
-            x, y = force_n[row].tolist()
-            take.forces.append((x, y))
+            take.steps += 1
+            take.forces.extend(force_n[row].tolist())
             take.total_reward += float(reward[row])
         self._check(np.sort([row for row in made if steps[row] % self._every == 0]))
 
@@ -127,7 +129,7 @@ class Recorder:
             ValueError: the row was reset or stepped meanwhile without the recorder being told.
         """
         simulation, take = self._simulation, self._takes[row]
-        steps, now = len(take.forces), int(simulation.state.steps[row])
+        steps, now = take.steps, int(simulation.state.steps[row])
         if steps != now:
             raise ValueError(f"row {row}: found it at step {now} after {steps} recorded")
         if steps > MAX_STEPS:
@@ -135,7 +137,7 @@ class Recorder:
         sums = take.checksums
         if steps % self._every:
             sums = [*sums, checksums(simulation, np.array([row]), _NAMES)[0]]
-        force_n = np.array(take.forces, dtype=np.float64).reshape(-1, 2)
+        force_n = np.array(take.forces).reshape(-1, 2)
         return Replay(
             level=simulation.compiled.level,
             options=Options.of(simulation.config),

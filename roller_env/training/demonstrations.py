@@ -107,6 +107,8 @@ def _from_replays(replays: Sequence[Replay], wanted: EnvConfig) -> list[Demonstr
             wanted.control_dt_s / e.replay.options.control_dt_s,
         )
         for e in tqdm(played, total=len(replays), desc="demonstrations", unit=" episodes")
+        # In an episode that was left in its intro, nothing was done.
+        if len(e)
     ]
 
 
@@ -180,6 +182,7 @@ def _from_minari(data_set: Any, wanted: EnvConfig) -> list[Demonstration]:
             ratio,
         )
         for episode in data_set.iterate_episodes()
+        if len(episode.actions)
     ]
 
 
