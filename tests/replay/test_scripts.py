@@ -7,10 +7,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from roller_env.replay import save_replay
-from tests.replay.recording import pushed_otherwise, wandered
+from roller_env.replay import load_replay, save_replay, shipped_replays, verify
+from tests.replay.recording import pushed_otherwise, same, wandered
+from tests.replay.test_conversion import of_format_1
 
 ROOT = Path(__file__).parents[2]
 
@@ -38,6 +40,56 @@ def test_a_replay_is_verified_unless_something_else_is_asked_for(tmp_path: Path)
     assert "another game at step 10 of" in output
 
 
+def test_an_old_replay_is_converted_and_nothing_is_overwritten(tmp_path: Path) -> None:
+    played = wandered("flat")
+    old, new = tmp_path / "old.replay", tmp_path / "new.replay"
+    old.write_bytes(of_format_1(played))
+    status, output, _ = run(old, "--convert", new)
+    assert status == 0
+    assert f"written to {new}" in output
+    assert same(load_replay(new), played)
+    status, _, error = run(old, "--convert", new)
+    assert status == 1
+    assert "is not overwritten" in error
+
+
+def test_replays_that_outlived_a_kill_become_data_sets_though_one_is_damaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    minari = pytest.importorskip("minari", reason="the extra 'demos' is not installed")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "sets"))
+    games = tmp_path / "games"
+    save_replay(wandered("flat"), games / "flat-0000.replay")
+    save_replay(wandered("flat", seed=1), games / "flat-0001.replay")
+    (games / "flat-0002.replay").write_bytes(b"half of a replay")
+    status, output, error = run(games, "--record", "roller/human")
+    assert status == 1
+    assert output == "data set: roller/human/flat-v0\n"
+    assert "flat-0002.replay: not a replay" in error
+    assert minari.load_dataset("roller/human/flat-v0").total_episodes == 2
+
+
+def test_demonstrations_are_recorded_anew_from_their_actions(tmp_path: Path) -> None:
+    shipped = load_replay(shipped_replays()["flat"])
+    (tmp_path / "flat.replay").write_bytes(of_format_1(shipped))
+    done = subprocess.run(
+        [
+            sys.executable,
+            str(ROOT / "scripts" / "make_demonstrations.py"),
+            *("flat", "--rerecord", "--output", str(tmp_path)),
+        ],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    again = load_replay(tmp_path / "flat.replay")
+    assert np.array_equal(again.actions, shipped.actions)
+    assert again.result == shipped.result
+    assert verify(again).is_exact
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -45,6 +97,8 @@ def test_a_replay_is_verified_unless_something_else_is_asked_for(tmp_path: Path)
         ((ROOT / "README.md",), "not a replay"),
         (("flat", "--video", "film.avi"), "must end in .mp4 or .gif"),
         (("flat", "--size", "33", "20"), "must be even numbers"),
+        (("flat", "--show", "--port", "99999"), "port: found 99999; must be a whole number from 0"),
+        (("flat", "--show", "--port", "-1"), "port: found -1; must be"),
         (("flat", "--camera", "6"), "allowed are game and 0 to 5"),
     ],
 )
