@@ -132,7 +132,8 @@ def write_record(keeper: ReplayKeeper, record: str | None) -> int:
         if not (written.names or problems):
             lines.append("no data set: nothing was played with keys that worked")
     # Last, since there may be no terminal any more.
-    print("\n".join(lines), flush=True)
+    for line in lines:
+        print(line, flush=True)
     for problem in problems:
         print(f"error: {problem}", file=sys.stderr)
     return 1 if problems else 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import os
 import sys
 from pathlib import Path
 from typing import Final
@@ -36,7 +37,12 @@ class ReplayKeeper:
             directory: for the files, ``classic-0000.replay`` and so on, of which none is
                 overwritten; None writes none.
             player: who plays, in words.
+
+        Raises:
+            ReplayError: nothing can be written there.
         """
+        if directory is not None:
+            _check_directory(directory)
         self.replays: list[Replay] = []
         self.files: list[Path] = []
         self._directory = directory
@@ -104,9 +110,18 @@ class ReplayKeeper:
         self.files.append(file)
 
 
+def _check_directory(directory: Path) -> None:
+    """Make the directory, so that who plays is told before that nothing can be kept there."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ReplayError(f"{directory}: {error.strerror}; replays cannot be kept there") from None
+    if not os.access(directory, os.W_OK):
+        raise ReplayError(f"{directory}: not writable; replays cannot be kept there")
+
+
 def _new_file(directory: Path, level: str) -> Path:
     """Make and return the first file of that level's name that there is none of yet."""
-    directory.mkdir(parents=True, exist_ok=True)
     for number in itertools.count():
         file = directory / f"{level}-{number:04d}{SUFFIX}"
         # Another process may be looking for one too.

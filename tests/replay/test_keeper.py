@@ -9,7 +9,7 @@ import pytest
 
 from roller_env.play.session import GameSession, Phase, play_config
 from roller_env.replay import keeper as keeper_module
-from roller_env.replay import load_replay, verify
+from roller_env.replay import ReplayError, load_replay, verify
 from roller_env.replay.keeper import SAVE_EVERY_S, ReplayKeeper
 from roller_env.replay.recorder import place_at_starts
 from roller_env.simulation import Simulation
@@ -110,6 +110,15 @@ def test_a_game_that_cannot_be_written_is_told_of_and_played_on(
     session.close()
     assert len(keeper.replays) == 2
     assert [file.name for file in keeper.files] == ["flat-0000.replay"]
+
+
+@pytest.mark.parametrize("place", ["file", "file/in/it"])
+def test_where_nothing_can_be_kept_is_told_before_anything_is_played(
+    tmp_path: Path, place: str
+) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ReplayError, match="replays cannot be kept there"):
+        ReplayKeeper(tmp_path / place)
 
 
 def test_two_processes_that_keep_games_in_one_directory_overwrite_none(tmp_path: Path) -> None:
