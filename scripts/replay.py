@@ -19,6 +19,8 @@ from typing import Annotated, Literal
 import tyro
 
 from roller_env.game.cameras import MODES
+from roller_env.level import load_level, shipped_levels
+from roller_env.physics.presets import PRESETS
 from roller_env.replay import (
     Replay,
     ReplayError,
@@ -167,12 +169,18 @@ def _check(arguments: Arguments) -> None:
 
 
 def _about(replay: Replay) -> str:
-    result = replay.result
-    return (
-        f"{replay.level.name}: {replay.player or 'unknown player'}, {len(replay)} steps, "
+    result, level, preset = replay.result, replay.level, replay.options.physics
+    lines = [
+        f"{level.name}: {replay.player or 'unknown player'}, {len(replay)} steps, "
         f"{result.time_s:.2f} s, {result.outcome}, {result.coins} coins "
         f"({result.score_percent:.0f} %)"
-    )
+    ]
+    # A replay brings its own level and physics, whatever it calls them.
+    if level.name in shipped_levels() and load_level(level.name) != level:
+        lines.append(f"note: its level is not the {level.name!r} of this version of Roller")
+    if PRESETS.get(preset.name) != preset:
+        lines.append(f"note: its physics is not a preset of this version of Roller: {preset}")
+    return "\n".join(lines)
 
 
 if __name__ == "__main__":

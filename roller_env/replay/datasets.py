@@ -43,7 +43,7 @@ def to_minari(
 ) -> MinariDataset:
     """Write replays as a Minari data set and return it.
 
-    Observations, actions and rewards are computed by playing the replays again, every step of
+    Observations, actions and rewards are computed by playing the replays again, every checksum of
     which is compared with the recording, so they are what the environment gave, to the bit.
 
     Args:

@@ -69,7 +69,7 @@ class Recorder:
             seed: what their generators were seeded with, to be told to whoever reads the replay.
 
         Raises:
-            ValueError: a row's game is not at its beginning.
+            ValueError: a row's game is not at its beginning, or did not begin as the level says.
         """
         chosen = np.sort(np.asarray(rows, dtype=np.int64))
         if len(chosen) == 0:
@@ -79,6 +79,13 @@ class Recorder:
         if len(under_way):
             raise ValueError(
                 f"rows: found {under_way.tolist()} under way; a recording begins right after reset"
+            )
+        elsewhere = chosen[self._simulation.ball_velocity[chosen].any(axis=1)]
+        elsewhere = np.union1d(elsewhere, chosen[state.coin_taken[chosen].any(axis=1)])
+        if len(elsewhere):
+            raise ValueError(
+                f"rows: found {elsewhere.tolist()} begun with a moving ball or without coins; what "
+                "is on record begins as the level says"
             )
         positions = self._simulation.ball_position
         for row in chosen.tolist():

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from roller_env.play.session import GameSession, Phase, play_config
-from roller_env.replay import keeper as keeper_module
 from roller_env.replay import ReplayError, load_replay, verify
+from roller_env.replay import keeper as keeper_module
 from roller_env.replay.keeper import SAVE_EVERY_S, ReplayKeeper
 from roller_env.replay.recorder import place_at_starts
 from roller_env.simulation import Simulation

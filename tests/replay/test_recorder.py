@@ -147,6 +147,16 @@ def test_games_of_which_starts_and_forces_were_kept_become_the_replays_they_woul
     assert all(same(one, other) for one, other in zip(played, again, strict=True))
 
 
+def test_games_without_a_step_are_replays_without_one() -> None:
+    starts = np.array([wandered().start, wandered("flat", seed=1).start])
+    for steps in (0, 3):
+        pushes = [np.zeros((0, 2)), np.zeros((steps, 2))]
+        none, some = replays_of(wandered().config(), starts, pushes)
+        assert (len(none), len(some)) == (0, steps)
+        assert verify(none).is_exact
+        assert verify(some).is_exact
+
+
 def test_no_games_are_no_replays() -> None:
     assert replays_of(wandered().config(), np.zeros((0, 3)), []) == []
 
@@ -202,6 +212,23 @@ def test_a_recording_begins_at_a_beginning() -> None:
     with pytest.raises(ValueError, match=r"found \[0, 2\] under way"):
         Recorder(simulation).begin([0, 1, 2])
     Recorder(simulation).begin([1])
+
+
+def test_a_game_that_was_put_elsewhere_is_no_game_of_the_level() -> None:
+    simulation = simulation_of("flat", num_envs=2, physics="fast")
+    snapshot = simulation.snapshot()
+    snapshot.game["coin_taken"][1, 0] = True
+    simulation.restore(snapshot)
+    with pytest.raises(ValueError, match=r"found \[1\] begun with a moving ball or without coins"):
+        Recorder(simulation).begin([0, 1])
+    snapshot = simulation.snapshot(np.array([0]))
+    # MuJoCo's state is time, positions and then velocities.
+    velocity = 1 + simulation.compiled.model.nq + simulation.compiled.ball_qvel
+    snapshot.physics[0, velocity] = 1.0
+    simulation.restore(snapshot)
+    assert simulation.ball_velocity[0].tolist() == [1.0, 0.0, 0.0]
+    with pytest.raises(ValueError, match=r"found \[0\] begun with a moving ball"):
+        Recorder(simulation).begin([0])
 
 
 def test_a_step_that_the_recorder_was_not_told_of_is_noticed() -> None:

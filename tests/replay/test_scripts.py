@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from roller_env.replay import load_replay, save_replay, shipped_replays, verify
+from scripts.replay import _about as about
 from tests.replay.recording import pushed_otherwise, same, wandered
 from tests.replay.test_conversion import of_format_1
 
@@ -38,6 +40,18 @@ def test_a_replay_is_verified_unless_something_else_is_asked_for(tmp_path: Path)
     status, output, _ = run(save_replay(pushed_otherwise(played, 8), tmp_path / "other.replay"))
     assert status == 1
     assert "another game at step 10 of" in output
+
+
+def test_a_level_or_preset_that_only_has_the_name_of_one_is_told_of() -> None:
+    played = wandered("flat")
+    assert about(played).count("\n") == 0
+    nearer = played.level.model_copy(update={"title": "Another floor"})
+    assert "note: its level is not the 'flat' of this version" in about(
+        replace(played, level=nearer)
+    )
+    weak = replace(played.options.physics, iterations=1)
+    options = played.options.model_copy(update={"physics": weak})
+    assert "note: its physics is not a preset of this" in about(replace(played, options=options))
 
 
 def test_an_old_replay_is_converted_and_nothing_is_overwritten(tmp_path: Path) -> None:
