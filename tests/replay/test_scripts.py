@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
+import contextlib
+import io
+import runpy
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -19,17 +20,23 @@ from tests.replay.test_conversion import of_format_1
 ROOT = Path(__file__).parents[2]
 
 
-def run(*arguments: object) -> tuple[int, str, str]:
-    """Run scripts/replay.py; return its status and what it wrote."""
-    done = subprocess.run(
-        [sys.executable, str(ROOT / "scripts" / "replay.py"), *map(str, arguments)],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    return done.returncode, done.stdout, done.stderr
+def run(*arguments: object, script: str = "replay.py") -> tuple[int, str, str]:
+    """Run a script as from the command line; return its status and what it wrote."""
+    output, error = io.StringIO(), io.StringIO()
+    command = [script, *map(str, arguments)]
+    with (
+        pytest.MonkeyPatch.context() as patched,
+        contextlib.redirect_stdout(output),
+        contextlib.redirect_stderr(error),
+    ):
+        patched.setattr(sys, "argv", command)
+        with pytest.raises(SystemExit) as ended:
+            runpy.run_path(str(ROOT / "scripts" / script), run_name="__main__")
+    status = ended.value.code
+    if isinstance(status, str):
+        # What Python does with such a one.
+        return 1, output.getvalue(), f"{error.getvalue()}{status}\n"
+    return int(status or 0), output.getvalue(), error.getvalue()
 
 
 def test_a_replay_is_verified_unless_something_else_is_asked_for(tmp_path: Path) -> None:
@@ -86,18 +93,10 @@ def test_replays_that_outlived_a_kill_become_data_sets_though_one_is_damaged(
 def test_demonstrations_are_recorded_anew_from_their_actions(tmp_path: Path) -> None:
     shipped = load_replay(shipped_replays()["flat"])
     (tmp_path / "flat.replay").write_bytes(of_format_1(shipped))
-    done = subprocess.run(
-        [
-            sys.executable,
-            str(ROOT / "scripts" / "make_demonstrations.py"),
-            *("flat", "--rerecord", "--output", str(tmp_path)),
-        ],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    command = ("flat", "--rerecord", "--output", tmp_path)
+    status, output, _ = run(*command, script="make_demonstrations.py")
+    assert status == 0
+    assert "finish, 12 coins" in output
     again = load_replay(tmp_path / "flat.replay")
     assert np.array_equal(again.actions, shipped.actions)
     assert again.result == shipped.result
