@@ -27,6 +27,7 @@ from roller_env.replay.checksums import MAX_ROWS, QUANTITIES, Checksums, row_cou
 from roller_env.replay.errors import ReplayError
 
 Float64 = npt.NDArray[np.float64]
+
 FORMAT_VERSION: Final = 2
 """Raised when a file of before can no longer be read."""
 

@@ -104,7 +104,7 @@ class ReplayKeeper:
         try:
             save_replay(replay, file)
         except OSError:
-            file.unlink()
+            file.unlink(missing_ok=True)
             raise
         self._file = file
         self.files.append(file)

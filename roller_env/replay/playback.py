@@ -138,6 +138,7 @@ class Verification:
 
     Attributes:
         steps: the replay's.
+        checks: moments at which the replay has checksums.
         step_s: length of one.
         first_mismatch_step: the first step after which a checksum was another than when it was
             recorded, 0 if the game began otherwise; None if none was.
@@ -151,6 +152,7 @@ class Verification:
     """
 
     steps: int
+    checks: int
     step_s: float
     first_mismatch_step: int | None
     last_match_step: int | None
@@ -169,7 +171,8 @@ class Verification:
         others = "; ".join(self.differences)
         if self.is_exact:
             note = f" (though recorded with {others})" if others else ""
-            return f"the same bit for bit over {self.steps} steps{note}"
+            seen = f"{self.steps} steps, checked at {self.checks} moments"
+            return f"the same bit for bit over {seen}{note}"
         if self.first_mismatch_step is None:
             reason = f"recorded with {others}" if others else "its result was written by another"
             return f"the same states bit for bit, but another result is recorded: {reason}"
@@ -213,6 +216,7 @@ def verify(replay: Replay) -> Verification:
         total_reward += float(playback.advance().reward[0])
     return Verification(
         steps=len(replay),
+        checks=len(sums.table),
         step_s=simulation.duration_s,
         first_mismatch_step=first,
         last_match_step=last,

@@ -346,7 +346,7 @@ def test_a_name_too_long_or_of_escape_characters_is_refused_before_it_is_written
         replace(PLAYED, player="\x1b[2J")
 
 
-def test_whoever_is_killed_while_writing_leaves_the_file_of_before(
+def test_whoever_is_killed_or_has_no_space_while_writing_leaves_the_file_of_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = save_replay(PLAYED, tmp_path / "game.replay")
@@ -356,7 +356,15 @@ def test_whoever_is_killed_while_writing_leaves_the_file_of_before(
             stream.write(content[:99])
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Path, "write_bytes", killed)
-    with pytest.raises(KeyboardInterrupt):
-        save_replay(wandered("flat"), file)
-    assert same(load_replay(file), PLAYED)
+    def full(path: Path, content: bytes) -> None:
+        with path.open("wb") as stream:
+            stream.write(content[:99])
+        raise OSError(28, "No space left on device")
+
+    for failing, error in ((full, OSError), (killed, KeyboardInterrupt)):
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "write_bytes", failing)
+            with pytest.raises(error):
+                save_replay(wandered("flat"), file)
+        assert same(load_replay(file), PLAYED)
+        assert failing is killed or list(tmp_path.iterdir()) == [file]

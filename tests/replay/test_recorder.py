@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 import pytest
 from gymnasium.vector import AutoresetMode
 
@@ -34,11 +37,12 @@ def test_any_preset_and_any_action_are_on_record(physics: str, action: ActionMod
     simulation = simulation_of("gate", physics=physics, action=action, num_threads=1)
     recorder = Recorder(simulation)
     recorder.begin()
-    actions = {
+    of_mode: dict[str, npt.NDArray[Any]] = {
         "directions": rng.integers(9, size=60),
         "keys": rng.integers(2, size=(60, 4)),
         "force": rng.uniform(-1.0, 1.0, (60, 2)).astype(np.float32),
-    }[action]
+    }
+    actions = of_mode[action]
     for done in actions:
         force = forces(action, done[None])
         recorder.record(force, simulation.step(force).reward)
