@@ -208,6 +208,31 @@ class Simulation:
         return self._position.copy()
 
     @property
+    def ball_velocity(self) -> Float64:
+        """(N, 3) copy of the ball centres' velocities, m/s, world frame."""
+        return self._velocity.copy()
+
+    @property
+    def ball_orientation(self) -> Float64:
+        """(N, 4) copy of the balls' orientations, quaternions w, x, y, z from ball to world."""
+        return self._orientation.copy()
+
+    @property
+    def ball_angular_velocity(self) -> Float64:
+        """(N, 3) copy of the balls' angular velocities, rad/s, in each ball's own frame."""
+        return self._spin.copy()
+
+    @property
+    def plate_displacement(self) -> Float64:
+        """(N, P) copy of how far the plates are over where the level puts them, metres, <= 0."""
+        return self._stepper.qpos[:, self.compiled.plate_qpos]
+
+    @property
+    def gate_displacement(self) -> Float64:
+        """(N, G) copy of how far the gates are over where the level puts them, metres."""
+        return self._stepper.qpos[:, self.compiled.gate_qpos]
+
+    @property
     def qpos(self) -> Float64:
         """(N, nq) copy of MuJoCo's positions, for drawing."""
         return self._stepper.qpos.copy()

@@ -1,11 +1,14 @@
 """Let the scripted player play, and keep what it does as replays.
 
 Without options it makes the demonstrations that are shipped, one a level; do so after changing a
-level, a material, a preset or the rules. With --episodes it makes demonstrations to learn from.
+level, a material, a preset or the rules. With --rerecord it plays what is there again, action by
+action, and keeps it where the game ends as it did: enough after a change that leaves the games what
+they are. With --episodes it makes demonstrations to learn from.
 
 Examples::
 
     python scripts/make_demonstrations.py
+    python scripts/make_demonstrations.py --rerecord
     python scripts/make_demonstrations.py classic --episodes 40 --slips 0.1 --output demonstrations
 """
 
@@ -19,10 +22,18 @@ from typing import Annotated
 import tyro
 from tqdm import tqdm
 
-from roller_env.config import EnvConfig
+from roller_env.config import EnvConfig, make_config
 from roller_env.level import Level, LevelError, levels_directory, load_level, shipped_levels
 from roller_env.problems import printable
-from roller_env.replay import load_replay, record_episode, save_replay, verify
+from roller_env.replay import (
+    Replay,
+    ReplayError,
+    load_replay,
+    record_episode,
+    save_replay,
+    verify,
+)
+from roller_env.replay.conversion import load_any, record_anew
 from roller_env.replay.scripted import PLAYER, ScriptedPlayer
 
 
@@ -35,6 +46,9 @@ class Arguments:
 
     output: Path = levels_directory().parent / "replays"
     """Directory for them: LEVEL.replay, or LEVEL-NUMBER.replay if there are several."""
+
+    rerecord: bool = False
+    """Record the actions of the replays that are there anew, instead of playing otherwise."""
 
     episodes: int = 1
     """How many of each level."""
@@ -58,16 +72,25 @@ def main(arguments: Arguments) -> int:
         for seed in tqdm(numbers, desc=level.name, unit=" episodes"):
             failed += not demonstrate(level, seed, arguments)
     if failed:
-        print(f"{failed} did not reach the finish", file=sys.stderr)
+        print(f"{failed} were not kept", file=sys.stderr)
     # Recovering from slips does not always succeed, and need not.
     return 1 if failed and arguments.slips == 0.0 else 0
 
 
 def demonstrate(level: Level, seed: int, arguments: Arguments) -> bool:
     """Play an episode; return whether it reached the finish, and only then keep it."""
+    name = level.name if arguments.episodes == 1 else f"{level.name}-{seed}"
+    file = arguments.output / f"{name}.replay"
     config = EnvConfig(level=level, physics=arguments.physics, num_threads=1)
-    player = ScriptedPlayer(level, slips=arguments.slips, seed=seed)
-    replay = record_episode(config, player, seed=seed, player=PLAYER)
+    if arguments.rerecord:
+        try:
+            replay = play_again(file, config)
+        except ReplayError as error:
+            tqdm.write(f"{error}; not kept")
+            return False
+    else:
+        player = ScriptedPlayer(level, slips=arguments.slips, seed=seed)
+        replay = record_episode(config, player, seed=seed, player=PLAYER)
     result = replay.result
     told = (
         f"{result.outcome}, {result.coins} coins ({result.score_percent:.0f} %), "
@@ -76,10 +99,20 @@ def demonstrate(level: Level, seed: int, arguments: Arguments) -> bool:
     if not result.success:
         tqdm.write(f"{level.name}, seed {seed}: {told}; not kept")
         return False
-    name = level.name if arguments.episodes == 1 else f"{level.name}-{seed}"
-    file = save_replay(replay, arguments.output / f"{name}.replay")
+    save_replay(replay, file)
     tqdm.write(f"{file}: {told}, {file.stat().st_size} bytes, {verify(load_replay(file))}")
     return True
+
+
+def play_again(file: Path, config: EnvConfig) -> Replay:
+    """Play the actions of a file, of any format, on a level and preset as they are now.
+
+    Raises:
+        ReplayError: it cannot be read, or its game ends otherwise now.
+    """
+    played = load_any(file)
+    options = played.options.keywords() | {"physics": config.physics}
+    return record_anew(played, make_config(level=config.level, num_threads=1, **options))
 
 
 if __name__ == "__main__":

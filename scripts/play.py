@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 import tyro
 
@@ -26,6 +26,7 @@ from roller_env.play.server import (
     DEFAULT_PORT,
     LOOPBACK,
     NATIVE_NOTE,
+    check_address,
     open_page,
     open_window,
     run,
@@ -36,6 +37,9 @@ from roller_env.play.sound import CoinSound
 from roller_env.problems import printable
 from roller_env.replay import datasets
 from roller_env.replay.keeper import ReplayKeeper
+
+RECORDED: Final = Path("replays")
+"""Where games are kept that are to become data sets, if nothing else is asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,21 +81,27 @@ class Arguments:
     """Directory for a replay of every game; scripts/replay.py verifies, shows and films them."""
 
     record: str | None = None
-    """Prefix of Minari data sets of what was played, one a level, such as roller/human."""
+    """Prefix of Minari data sets of what was played, one a level, such as roller/human. Every game
+    is kept as a replay too, without --replays in the directory replays."""
 
     mute: bool = False
     """No sound."""
 
 
-def main(arguments: Arguments) -> None:
-    """Do what the command line says."""
+def main(arguments: Arguments) -> int:
+    """Do what the command line says; return the exit status, 1 if something was not written."""
+    directory = arguments.replays
     if arguments.record is not None:
         datasets.check_prefix(arguments.record)
+        # The data sets are written at the end, and what is killed before has none.
+        directory = directory or RECORDED
+    if arguments.viewer == "web":
+        check_address(arguments.host, arguments.port)
     # When its terminal is closed, the game still writes what was recorded.
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.default_int_handler)
     config, agent = game_of(arguments)
-    keeper = ReplayKeeper(arguments.replays, "human" if agent is None else "agent and human")
+    keeper = ReplayKeeper(directory, "human" if agent is None else "agent and human")
     choices = level_choices(config.level)
     sound = CoinSound(muted=arguments.mute)
     if sound.silent_because and not arguments.mute:
@@ -106,17 +116,32 @@ def main(arguments: Arguments) -> None:
         if warning := warning_of(arguments.host):
             print(warning, file=sys.stderr)
         handle = open_page(plugins, port=arguments.port, host=arguments.host)
-    run(handle)
-    write_record(keeper, arguments)
+    try:
+        run(handle)
+    finally:
+        status = write_record(keeper, arguments.record)
+    return status
 
 
-def write_record(keeper: ReplayKeeper, arguments: Arguments) -> None:
-    """Say where the replays are, and write the data sets that were asked for."""
-    for file in keeper.files:
-        print(f"replay: {file}")
-    if arguments.record is not None:
-        for name in datasets.to_minari_by_level(keeper.replays, arguments.record):
-            print(f"data set: {name}")
+def write_record(keeper: ReplayKeeper, record: str | None) -> int:
+    """Write the data sets that were asked for, and say where all is; return the exit status."""
+    lines = [f"replay: {file}" for file in keeper.files]
+    problems: tuple[str, ...] = ()
+    if record is not None:
+        # Whoever closes the terminal or shuts the machine down asks more than once.
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_IGN)
+        written = datasets.to_minari_by_level(keeper.replays, record)
+        lines += [f"data set: {name}" for name in written.names]
+        problems = written.problems
+        if not (written.names or problems):
+            lines.append("no data set: nothing was played with keys that worked")
+    # Last, since there may be no terminal any more.
+    for line in lines:
+        print(line, flush=True)
+    for problem in problems:
+        print(f"error: {problem}", file=sys.stderr)
+    return 1 if problems else 0
 
 
 def game_of(arguments: Arguments) -> tuple[EnvConfig, Player | None]:
@@ -151,6 +176,6 @@ def session_maker(
 
 if __name__ == "__main__":
     try:
-        main(tyro.cli(Arguments, description=__doc__))
+        sys.exit(main(tyro.cli(Arguments, description=__doc__)))
     except (RuntimeError, ValueError) as error:
         sys.exit(f"error: {printable(error)}")

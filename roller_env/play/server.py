@@ -12,8 +12,10 @@ controls up or is gone. (Read and tried with MuJoCo 4.0.0.)
 
 from __future__ import annotations
 
+import errno
 import functools
 import re
+import socket
 import sys
 from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Any, Final
@@ -30,6 +32,8 @@ LOCAL_ORIGINS: Final = (
     None,
 )
 """Origins of pages that this machine served: a tunnel's other end may have another port."""
+
+MAX_PORT: Final = 65535
 
 NATIVE_PYTHON: Final = (3, 12)
 """Studio's window imports `collections.abc.Buffer`, which Python has since 3.12."""
@@ -48,6 +52,30 @@ Plugins = Sequence[plugin.Plugin]
 
 class PlayError(RuntimeError):
     """The game cannot be shown; the message says why and what helps."""
+
+
+def check_address(host: str, port: int) -> None:
+    """Refuse, before anything is loaded, an address on which no page could be served.
+
+    Args:
+        host: address of the interface to listen on.
+        port: 0 for the first free one from 8080.
+
+    Raises:
+        PlayError: there is no such port or address, it is taken, or it is not allowed.
+    """
+    if not 0 <= port <= MAX_PORT:
+        raise PlayError(f"port: found {port}; must be a whole number from 0 to {MAX_PORT}")
+    try:
+        with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
+            # As Studio's server does, so that a port is free that somebody has just left.
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((host, port))
+    except OSError as error:
+        where, hint = f"host {host!r}", "--host says where to listen"
+        if error.errno in (errno.EADDRINUSE, errno.EACCES):
+            where, hint = f"port {port} of {host}", "--port 0 takes a free one"
+        raise PlayError(f"{where}: {error.strerror}; {hint}") from None
 
 
 def open_page(

@@ -5,26 +5,30 @@ from __future__ import annotations
 import hashlib
 import platform
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from importlib.metadata import version
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from roller_env import __version__
 from roller_env.config import EnvConfig, make_config
-from roller_env.game.actions import ActionMode
+from roller_env.game.actions import ActionMode, forces
 from roller_env.game.observations import ObservationMode
 from roller_env.game.rewards import RewardMode, RewardWeights
+from roller_env.game.version import RULES_VERSION
 from roller_env.level import Level
 from roller_env.physics.presets import PhysicsPreset, physics_preset
+from roller_env.physics.version import PHYSICS_VERSION, Engine
+from roller_env.replay.actions import Actions, checked_actions
+from roller_env.replay.checksums import MAX_ROWS, QUANTITIES, Checksums, row_count
+from roller_env.replay.errors import ReplayError
 
 Float64 = npt.NDArray[np.float64]
-Checksums = npt.NDArray[np.uint32]
 
-FORMAT_VERSION: Final = 1
+FORMAT_VERSION: Final = 2
 """Raised when a file of before can no longer be read."""
 
 MAX_STEPS: Final = 2**20
@@ -40,12 +44,17 @@ _MAX_SOLVER_ITERATIONS: Final = 1000
 MAX_TEXT: Final = 200
 """Characters of a name in a replay."""
 
-Text = Annotated[str, Field(max_length=MAX_TEXT)]
+
+def _printable(text: str) -> str:
+    """Refuse what would do something to the terminal that it is written on."""
+    if not text.isprintable():
+        raise ValueError(f"found {text!r}, which has characters that cannot be printed")
+    return text
+
+
+Text = Annotated[str, Field(max_length=MAX_TEXT), AfterValidator(_printable)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
-
-
-class ReplayError(ValueError):
-    """A replay that cannot be read, written or played; the message says in one line why."""
+Count = Annotated[int, Field(ge=0, lt=2**31)]
 
 
 class _Frozen(BaseModel):
@@ -56,6 +65,9 @@ class Versions(_Frozen):
     """What computed the episode. The same on two machines, the bits are the same.
 
     Attributes:
+        rules: `roller_env.game.version.RULES_VERSION`.
+        engine: of the physics.
+        physics: `roller_env.physics.version.PHYSICS_VERSION` of that engine.
         roller: this package.
         mujoco: the physics.
         numpy: the rules' arrays.
@@ -66,6 +78,9 @@ class Versions(_Frozen):
         libc: the C library, whose sines and cosines MuJoCo uses.
     """
 
+    rules: Count
+    engine: Engine
+    physics: Count
     roller: Text
     mujoco: Text
     numpy: Text
@@ -76,9 +91,13 @@ class Versions(_Frozen):
     libc: Text
 
     @staticmethod
-    def here() -> Versions:
+    @cache
+    def here(engine: Engine = "mujoco") -> Versions:
         """Return what is installed here."""
         return Versions(
+            rules=RULES_VERSION,
+            engine=engine,
+            physics=PHYSICS_VERSION[engine],
             roller=__version__,
             mujoco=version("mujoco"),
             numpy=version("numpy"),
@@ -93,7 +112,7 @@ class Versions(_Frozen):
         """Return ``name mine, not theirs`` of all in which the two differ."""
         mine, theirs = self.model_dump(), other.model_dump()
         return tuple(
-            f"{name} {mine[name] or 'unknown'}, not {theirs[name] or 'unknown'}"
+            f"{name} {str(mine[name]) or 'unknown'}, not {str(theirs[name]) or 'unknown'}"
             for name in mine
             if mine[name] != theirs[name]
         )
@@ -167,7 +186,7 @@ class Result(_Frozen):
     fall: bool
     diverged: bool
     truncated: bool
-    coins: Annotated[int, Field(ge=0)]
+    coins: Count
     score_percent: Number
     time_s: Number
     total_reward: Number
@@ -194,9 +213,9 @@ class Replay:
         start: where the ball's centre began, metres, world frame. It is all that chance decides in
             an episode: the jitter that the row's random generator drew at the reset.
         intro: whether the keys worked only after the intro.
-        force_n: (T, 2) float64 newtons of the keys in every control step, world x and y.
-        checksums: (T + 1,) uint32 of the game's whole state before the first step and after each;
-            see `roller_env.replay.recorder.checksums`.
+        actions: what the player did in every control step, (T,), (T, 4) or (T, 2) as the action
+            mode has it; see `roller_env.replay.actions.checked_actions`.
+        checksums: by which a game is seen to be this one.
         result: how it ended.
         versions: what computed it.
         player: who played, in words.
@@ -207,7 +226,7 @@ class Replay:
     options: Options
     start: tuple[float, float, float]
     intro: bool
-    force_n: Float64
+    actions: Actions
     checksums: Checksums
     result: Result
     versions: Versions
@@ -222,29 +241,37 @@ class Replay:
         """
         if len(self.player) > MAX_TEXT:
             raise ReplayError(f"player: found {len(self.player)} characters; at most {MAX_TEXT}")
-        steps = len(self.force_n)
-        if self.force_n.shape != (steps, 2) or not np.isfinite(self.force_n).all():
-            raise ReplayError("the forces must be two finite numbers a step")
-        if self.checksums.shape != (steps + 1,):
-            raise ReplayError(f"{len(self.checksums)} checksums for {steps} steps; one more needed")
-        substeps = EnvConfig(**self.options.keywords()).substeps
-        if steps > MAX_STEPS or steps * substeps > MAX_PHYSICS_STEPS:
+        if not self.player.isprintable():
+            raise ReplayError(f"player: found {self.player!r}; must be characters that print")
+        object.__setattr__(self, "actions", checked_actions(self.options.action, self.actions))
+        check_game(self.level, self.options, self.start, len(self.actions))
+        self._check_checksums()
+
+    def _check_checksums(self) -> None:
+        sums = self.checksums
+        unknown = [name for name in sums.quantities if name not in QUANTITIES]
+        if unknown or not sums.quantities or len(set(sums.quantities)) < len(sums.quantities):
             raise ReplayError(
-                f"{steps} control steps of {substeps} physics steps each are too long a replay; "
-                f"allowed are {MAX_STEPS} control steps and {MAX_PHYSICS_STEPS} physics steps"
+                f"quantities: found {', '.join(sums.quantities)}; must be some of "
+                f"{', '.join(QUANTITIES)}, each once"
             )
-        begin, jitter = self.level.start.at, (*self.level.start.jitter, 0.0)
-        for here, there, most in zip(self.start, begin, jitter, strict=True):
-            # The sum of start and jitter is rounded.
-            if not abs(here - there) <= most + 1e-9 * max(1.0, abs(there)):
-                raise ReplayError(
-                    f"the ball starts at {self.start}; this level lets it start within {jitter} "
-                    f"of {begin}"
-                )
+        if sums.every < 1:
+            raise ReplayError(f"found checksums every {sums.every} steps; must be 1 or more")
+        rows = row_count(len(self), sums.every)
+        if sums.table.shape != (rows, len(sums.quantities)) or rows > MAX_ROWS:
+            raise ReplayError(
+                f"found checksums {sums.table.shape} for {len(self)} steps; needed are {rows} rows "
+                f"of {len(sums.quantities)}, and {MAX_ROWS} rows at most"
+            )
 
     def __len__(self) -> int:
         """Return the number of control steps."""
-        return len(self.force_n)
+        return len(self.actions)
+
+    @cached_property
+    def force_n(self) -> Float64:
+        """(T, 2) newtons of the keys in every control step, world x and y."""
+        return forces(self.options.action, self.actions)
 
     @cached_property
     def level_text(self) -> str:
@@ -270,3 +297,32 @@ class Replay:
 def canonical_text(level: Level) -> str:
     """Return a level as JSON in metres with every default written out: equal levels, equal text."""
     return level.model_dump_json()
+
+
+def check_game(
+    level: Level, options: Options, start: tuple[float, float, float], steps: int
+) -> None:
+    """Refuse, before anything is made, a game that no recording of a level can hold.
+
+    Args:
+        level: what was played.
+        options: how.
+        start: where the ball's centre began, metres.
+        steps: control steps.
+
+    Raises:
+        ReplayError: it is too long, or begins where the level does not.
+    """
+    substeps = EnvConfig(**options.keywords()).substeps
+    if steps > MAX_STEPS or steps * substeps > MAX_PHYSICS_STEPS:
+        raise ReplayError(
+            f"{steps} control steps of {substeps} physics steps each are too long a replay; "
+            f"allowed are {MAX_STEPS} control steps and {MAX_PHYSICS_STEPS} physics steps"
+        )
+    begin, jitter = level.start.at, (*level.start.jitter, 0.0)
+    for here, there, most in zip(start, begin, jitter, strict=True):
+        # The sum of start and jitter is rounded.
+        if not abs(here - there) <= most + 1e-9 * max(1.0, abs(there)):
+            raise ReplayError(
+                f"the ball starts at {start}; this level lets it start within {jitter} of {begin}"
+            )

@@ -7,9 +7,11 @@ directory that the environment variable ``MINARI_DATASETS_PATH`` names (``~/.min
 from __future__ import annotations
 
 import itertools
+import shutil
 import warnings
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Final
 
@@ -20,7 +22,8 @@ from roller_env.config import EnvConfig
 from roller_env.envs.spaces import action_space, observation_space
 from roller_env.level import load_level
 from roller_env.physics.presets import PRESETS, physics_preset
-from roller_env.replay.contents import Replay, ReplayError
+from roller_env.replay.contents import Replay
+from roller_env.replay.errors import ReplayError
 from roller_env.replay.experience import Experience, experiences
 
 if TYPE_CHECKING:
@@ -31,25 +34,32 @@ _ANY_LEVEL: Final = "classic"
 _ANY_LEVEL_ID: Final = "Roller/Level-v0"
 
 
+class NothingPlayed(ReplayError):
+    """Replays in which the keys never worked, of which there is nothing to learn."""
+
+
 def to_minari(
     replays: Sequence[Replay], dataset_id: str, *, author: str = "", **changes: Any
 ) -> MinariDataset:
     """Write replays as a Minari data set and return it.
 
-    Observations, actions and rewards are computed by playing the replays again, every step of
+    Observations, actions and rewards are computed by playing the replays again, every checksum of
     which is compared with the recording, so they are what the environment gave, to the bit.
 
     Args:
-        replays: of one level, played with the same options.
+        replays: of one level, played with the same options; those in which the keys never worked,
+            having been left in the intro, are left out.
         dataset_id: what to call it, such as ``roller/classic/human-v0``.
         author: who played, for others to know.
         changes: other options than the replays' own, such as ``observation="rays"``.
 
     Raises:
+        NothingPlayed: in none of them did the keys ever work.
         ReplayError: a replay is not exact here, or its forces are none of the action mode's.
         ValueError: there are no replays, they are not of one game, or there is a data set of that
             name already.
         ImportError: Minari is not installed.
+        OSError: it cannot be written; nothing is left of it.
     """
     # Only this function needs it, and it takes a second to import.
     import minari
@@ -64,9 +74,13 @@ def to_minari(
                 "replays: found different levels or options; a data set is of one environment"
             )
     config = first.config(**changes)
-    episodes = [_buffer(EpisodeBuffer, e) for e in experiences(replays, **changes)]
+    episodes = [_buffer(EpisodeBuffer, e) for e in experiences(replays, **changes) if len(e)]
+    if not episodes:
+        raise NothingPlayed(
+            f"level {first.level.name!r}: the keys never worked, so nothing was done"
+        )
     players = sorted({replay.player or "unknown" for replay in replays})
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), _all_or_nothing(dataset_id):
         # It recommends an e-mail address, a link to the code and an environment to evaluate in.
         warnings.filterwarnings("ignore", category=UserWarning, module="minari")
         return minari.create_dataset_from_buffers(
@@ -77,39 +91,72 @@ def to_minari(
             observation_space=observation_space(config),
             algorithm_name=", ".join(players),
             author=author or None,
-            description=f"{len(replays)} episodes of Roller's level {first.level.name!r}.",
+            description=f"{len(episodes)} episodes of Roller's level {first.level.name!r}.",
             data_format=_DATA_FORMAT,
             requirements=[f"roller-env=={__version__}", f"mujoco=={version('mujoco')}"],
         )
 
 
-def to_minari_by_level(replays: Sequence[Replay], prefix: str, **changes: Any) -> list[str]:
+@contextmanager
+def _all_or_nothing(dataset_id: str) -> Iterator[None]:
+    """Leave no half of a data set, whose name would be taken and which nobody could read."""
+    from minari.storage import get_dataset_path
+
+    path = get_dataset_path(dataset_id)
+    was_there = path.exists()
+    try:
+        yield
+    except BaseException:
+        if not was_there:
+            shutil.rmtree(path, ignore_errors=True)
+        raise
+
+
+@dataclass(frozen=True)
+class Written:
+    """What came of writing data sets of several games.
+
+    Attributes:
+        names: of the data sets.
+        problems: what could not be written, and why, a line each.
+    """
+
+    names: tuple[str, ...]
+    problems: tuple[str, ...]
+
+
+def to_minari_by_level(replays: Sequence[Replay], prefix: str, **changes: Any) -> Written:
     """Write what a person played, whatever levels, as one data set a level and set of options.
 
+    Whatever happens to one of them, the others are written.
+
     Args:
-        replays: of any levels and options; those without a step are left out.
+        replays: of any levels and options; those in which the keys never worked are left out.
         prefix: of the data sets' names, such as ``roller/human``: then ``roller/human/classic-v0``,
             or the first version that there is none of yet.
         changes: see `to_minari`.
-
-    Returns:
-        The data sets' names.
     """
-    from minari import list_local_datasets
+    from minari.storage import get_dataset_path
 
     groups: dict[tuple[str, str], list[Replay]] = {}
     for replay in replays:
-        if len(replay):
-            key = (replay.level_hash, replay.options.model_dump_json())
-            groups.setdefault(key, []).append(replay)
-    written: list[str] = []
+        key = (replay.level_hash, replay.options.model_dump_json())
+        groups.setdefault(key, []).append(replay)
+    names: list[str] = []
+    problems: list[str] = []
     for group in groups.values():
-        known = {*list_local_datasets(), *written}
-        names = (f"{prefix}/{group[0].level.name}-v{number}" for number in itertools.count())
-        name = next(name for name in names if name not in known)
-        to_minari(group, name, **changes)
-        written.append(name)
-    return written
+        level = group[0].level.name
+        candidates = (f"{prefix}/{level}-v{number}" for number in itertools.count())
+        name = next(name for name in candidates if not get_dataset_path(name).exists())
+        try:
+            to_minari(group, name, **changes)
+        except NothingPlayed:
+            continue
+        except Exception as error:  # noqa: BLE001 - the other levels are to be written
+            problems.append(f"data set {name} not written: {error or type(error).__name__}")
+            continue
+        names.append(name)
+    return Written(tuple(names), tuple(problems))
 
 
 def check_prefix(prefix: str) -> None:

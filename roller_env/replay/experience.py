@@ -10,10 +10,12 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.envs.spaces import action_of_keys, shape_observation
-from roller_env.game.actions import DIRECTIONS, KEY_AXES, KEY_FORCE_N, KEYS, ActionMode, forces
-from roller_env.replay.contents import Replay, ReplayError
-from roller_env.replay.recorder import checksums, place_at_starts
+from roller_env.envs.spaces import shape_observation
+from roller_env.replay.actions import actions_of
+from roller_env.replay.checksums import checksums
+from roller_env.replay.contents import Replay
+from roller_env.replay.errors import ReplayError
+from roller_env.replay.recorder import place_at_starts
 from roller_env.simulation import Simulation
 
 Float64 = npt.NDArray[np.float64]
@@ -30,7 +32,8 @@ then take 115 MB. A single replay may have more."""
 class Experience:
     """One episode as an environment with the options asked for gives it.
 
-    It begins where the keys begin to work: while the intro runs, there is nothing to decide.
+    It begins where the keys begin to work: while the intro runs, there is nothing to decide. Of a
+    game that was left in its intro, nothing remains.
 
     Attributes:
         replay: whose it is.
@@ -92,44 +95,10 @@ def _groups(replays: Iterable[Replay]) -> Iterator[list[Replay]]:
         yield group
 
 
-def _game_of(replay: Replay) -> tuple[str, str, bool]:
+def _game_of(replay: Replay) -> tuple[str, str, bool, tuple[str, ...]]:
     """Return what is the same for replays that can be played together."""
-    return replay.level_hash, replay.options.model_dump_json(), replay.intro
-
-
-def actions_of(mode: ActionMode, force_n: Float64) -> npt.NDArray[Any]:
-    """Return the actions that push with ``force_n``, (T, 2) newtons: `forces` the other way round.
-
-    Raises:
-        ReplayError: no action of that mode does.
-    """
-    push = force_n / KEY_FORCE_N
-    actions: npt.NDArray[Any]
-    if mode == "force":
-        actions = push.astype(np.float32)
-    else:
-        along = np.clip(np.round(push @ KEY_AXES.T), 0.0, 1.0).astype(np.int8)
-        actions = along if mode == "keys" else _DIRECTION_OF_KEYS[along @ _BITS]
-    wrong = np.flatnonzero((forces(mode, actions) != force_n).any(axis=1))
-    if len(wrong):
-        raise ReplayError(
-            f"the force of step {wrong[0]}, {force_n[wrong[0]].tolist()} N, is no action of mode "
-            f"{mode!r}; choose another with the option 'action'"
-        )
-    return actions
-
-
-_BITS = 2 ** np.arange(len(KEYS))
-
-_DIRECTION_OF_KEYS = np.array(
-    [
-        action_of_keys("directions", "".join(k for i, k in enumerate(KEYS) if bits >> i & 1))
-        for bits in range(2 ** len(KEYS))
-    ]
-)
-"""Number among `DIRECTIONS` of every combination of held keys, by its bits."""
-
-assert len(DIRECTIONS) == _DIRECTION_OF_KEYS.max() + 1, "every direction is a combination of keys"
+    options = replay.options.model_dump_json()
+    return replay.level_hash, options, replay.intro, replay.checksums.quantities
 
 
 def _play(replays: list[Replay], changes: dict[str, Any]) -> list[Experience]:
@@ -141,25 +110,23 @@ def _play(replays: list[Replay], changes: dict[str, Any]) -> list[Experience]:
     place_at_starts(simulation, np.array([r.start for r in replays]), replays[0].intro)
     lengths = np.array([len(replay) for replay in replays])
     steps = int(lengths.max())
-    rows = np.arange(len(replays))
     force = np.zeros((steps, len(replays), 2))
-    expected = np.zeros((steps + 1, len(replays)), dtype=np.uint32)
     for row, replay in enumerate(replays):
         force[: len(replay), row] = replay.force_n
-        expected[: len(replay) + 1, row] = replay.checksums
     seen = np.empty((steps + 1, *simulation.observe().shape), dtype=np.float32)
     seen[0], reward = simulation.observe(), np.zeros((steps, len(replays)))
     terminated, truncated = (np.zeros((steps, len(replays)), dtype=bool) for _ in range(2))
-    # Control that comes back within a step does something in it.
     waits = np.zeros(len(replays), dtype=np.int64)
-    _compare(simulation, rows, expected[0], 0)
+    _compare(simulation, replays, 0)
     for step in range(steps):
-        waits += simulation.state.control_delay_s >= simulation.duration_s
+        # Control that comes back within a step does something in it.
+        waiting = simulation.state.control_delay_s >= simulation.duration_s
         transition = simulation.step(force[step], hold=lengths <= step)
+        waits += waiting & transition.stepped
         reward[step] = transition.reward
         terminated[step], truncated[step] = transition.terminated, transition.truncated
         seen[step + 1] = simulation.observe()
-        _compare(simulation, rows[lengths > step], expected[step + 1, lengths > step], step + 1)
+        _compare(simulation, replays, step + 1)
     return [
         Experience(
             replay=replay,
@@ -173,11 +140,25 @@ def _play(replays: list[Replay], changes: dict[str, Any]) -> list[Experience]:
     ]
 
 
-def _compare(simulation: Simulation, rows: npt.NDArray[np.int64], expected: Any, step: int) -> None:
-    different = rows[checksums(simulation, rows) != expected]
-    if len(different):
+def _compare(simulation: Simulation, replays: list[Replay], step: int) -> None:
+    """Refuse replays that are not the game which was recorded, where they have checksums of it."""
+    found = (
+        (row, replay.checksums.row_of(step, len(replay)))
+        for row, replay in enumerate(replays)
+        if step <= len(replay)
+    )
+    due = {row: number for row, number in found if number is not None}
+    if not due:
+        return
+    now = checksums(simulation, np.array(list(due)), replays[0].checksums.quantities)
+    others = [
+        names
+        for (row, number), sums in zip(due.items(), now, strict=True)
+        if (names := replays[row].checksums.mismatches(number, sums))
+    ]
+    if others:
         raise ReplayError(
-            f"{len(different)} of {simulation.num_envs} replays of level "
-            f"{simulation.compiled.level.name!r} part at step {step}: they were recorded with "
+            f"{len(others)} of {len(replays)} replays of level {simulation.compiled.level.name!r} "
+            f"are other games at step {step}, in {', '.join(others[0])}: they were recorded with "
             "other versions, which scripts/replay.py names"
         )

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.game.state import GameState
+from roller_env.replay.checksums import checksums
 from roller_env.replay.contents import Replay, Result, Versions
-from roller_env.replay.recorder import checksums, place_at_starts, result_of
+from roller_env.replay.recorder import place_at_starts, result_of
 from roller_env.simulation import Simulation, Snapshot, Transition
 
 Float64 = npt.NDArray[np.float64]
@@ -137,17 +138,25 @@ class Verification:
 
     Attributes:
         steps: the replay's.
+        checks: moments at which the replay has checksums.
         step_s: length of one.
-        parted_at: the first step after which the game's state was another than when it was
-            recorded, 0 if it began otherwise; None if it never was.
+        first_mismatch_step: the first step after which a checksum was another than when it was
+            recorded, 0 if the game began otherwise; None if none was.
+        last_match_step: the last step before that after which all of them were the same; None if
+            there is none. The game parted somewhere between the two.
+        mismatches: names of the quantities that were others then, of
+            `roller_env.replay.checksums.QUANTITIES`; none if the game was over by then.
         result: how the game ended this time.
         recorded: how it ended then.
         differences: what is of another version here than it was there.
     """
 
     steps: int
+    checks: int
     step_s: float
-    parted_at: int | None
+    first_mismatch_step: int | None
+    last_match_step: int | None
+    mismatches: tuple[str, ...]
     result: Result
     recorded: Result
     differences: tuple[str, ...]
@@ -155,15 +164,16 @@ class Verification:
     @property
     def is_exact(self) -> bool:
         """Whether the game was the same, bit for bit, and ended the same."""
-        return self.parted_at is None and self.result == self.recorded
+        return self.first_mismatch_step is None and self.result == self.recorded
 
     def __str__(self) -> str:
         """Say it in a line or a few."""
         others = "; ".join(self.differences)
         if self.is_exact:
             note = f" (though recorded with {others})" if others else ""
-            return f"the same bit for bit over {self.steps} steps{note}"
-        if self.parted_at is None:
+            seen = f"{self.steps} steps, checked at {self.checks} moments"
+            return f"the same bit for bit over {seen}{note}"
+        if self.first_mismatch_step is None:
             reason = f"recorded with {others}" if others else "its result was written by another"
             return f"the same states bit for bit, but another result is recorded: {reason}"
         if others:
@@ -173,30 +183,45 @@ class Verification:
                 "no version differs: the rules were changed since it was recorded, its processor "
                 "rounded otherwise, or the file was changed"
             )
+        what = ", ".join(self.mismatches) or "that the game is over before it"
+        known = "" if self.last_match_step is None else f", not yet at step {self.last_match_step}"
         return (
-            f"parts at step {self.parted_at} of {self.steps} "
-            f"({self.parted_at * self.step_s:.2f} s): {reason}; "
+            f"another game at step {self.first_mismatch_step} of {self.steps} "
+            f"({self.first_mismatch_step * self.step_s:.2f} s){known}, in {what}: {reason}; "
             f"it ended in {self.recorded.outcome!r} with {self.recorded.coins} coins, "
             f"and now in {self.result.outcome!r} with {self.result.coins}"
         )
 
 
 def verify(replay: Replay) -> Verification:
-    """Play a replay again and compare every step."""
+    """Play a replay again and compare every checksum."""
     playback = Playback(replay)
-    simulation = playback.simulation
-    now = np.empty(len(replay) + 1, dtype=np.uint32)
-    now[0] = checksums(simulation, _ROW)[0]
+    simulation, sums = playback.simulation, replay.checksums
     total_reward = 0.0
-    while playback.step < len(replay):
+    first: int | None = None
+    last: int | None = None
+    mismatches: tuple[str, ...] = ()
+    while True:
+        row = sums.row_of(playback.step, len(replay))
+        if first is None and row is not None:
+            now = checksums(simulation, _ROW, sums.quantities)[0]
+            mismatches = sums.mismatches(row, now)
+            first, last = (playback.step, last) if mismatches else (None, playback.step)
+        if playback.step == len(replay):
+            break
+        if simulation.state.over[0]:
+            # Nobody can do anything after the end.
+            first = playback.step + 1 if first is None else first
+            break
         total_reward += float(playback.advance().reward[0])
-        now[playback.step] = checksums(simulation, _ROW)[0]
-    different = np.flatnonzero(now != replay.checksums)
     return Verification(
         steps=len(replay),
+        checks=len(sums.table),
         step_s=simulation.duration_s,
-        parted_at=int(different[0]) if len(different) else None,
+        first_mismatch_step=first,
+        last_match_step=last,
+        mismatches=mismatches,
         result=result_of(simulation, 0, total_reward),
         recorded=replay.result,
-        differences=replay.versions.differences(Versions.here()),
+        differences=replay.versions.differences(Versions.here(replay.versions.engine)),
     )

@@ -1,22 +1,27 @@
-"""Recording: what a simulation's rows are told, and checksums of what came of it."""
+"""Recording: what a simulation's rows are told, and now and then checksums of what came of it."""
 
 from __future__ import annotations
 
-import zlib
+from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from roller_env.config import EnvConfig
-from roller_env.replay.contents import MAX_STEPS, Options, Replay, ReplayError, Result, Versions
+from roller_env.replay.actions import actions_of
+from roller_env.replay.checksums import QUANTITIES, Checksums, checksums, interval_of
+from roller_env.replay.contents import MAX_STEPS, Options, Replay, Result, Versions
+from roller_env.replay.errors import ReplayError
 from roller_env.simulation import Simulation
 
 Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
+UInt32 = npt.NDArray[np.uint32]
+
+_NAMES = tuple(QUANTITIES)
 
 
 @dataclass(slots=True)
@@ -26,8 +31,9 @@ class _Take:
     start: tuple[float, float, float]
     intro: bool
     seed: int | None
-    forces: list[tuple[float, float]] = field(default_factory=list)
-    checksums: list[int] = field(default_factory=list)
+    steps: int = 0
+    forces: array[float] = field(default_factory=lambda: array("d"))
+    checksums: list[UInt32] = field(default_factory=list)
     total_reward: float = 0.0
 
 
@@ -40,15 +46,19 @@ class Recorder:
     leave an ended game where the recorder can read it; `replays_of` records all others afterwards.
     """
 
-    def __init__(self, simulation: Simulation, player: str = ""):
+    def __init__(self, simulation: Simulation, player: str = "", check_every: int | None = None):
         """Make a recorder of a simulation.
 
         Args:
             simulation: whose rows to record.
             player: who plays, in words, such as ``human``.
+            check_every: control steps from one row of checksums to the next, so that with 1 the
+                very step is found at which a game is another one; by default as many as make
+                `roller_env.replay.checksums.INTERVAL_S`.
         """
         self._simulation = simulation
         self._player = player
+        self._every = check_every or interval_of(simulation.duration_s)
         self._takes: dict[int, _Take] = {}
 
     def begin(self, rows: Sequence[int] | Int64 = (0,), seed: int | None = None) -> None:
@@ -59,7 +69,7 @@ class Recorder:
             seed: what their generators were seeded with, to be told to whoever reads the replay.
 
         Raises:
-            ValueError: a row's game is not at its beginning.
+            ValueError: a row's game is not at its beginning, or did not begin as the level says.
         """
         chosen = np.sort(np.asarray(rows, dtype=np.int64))
         if len(chosen) == 0:
@@ -70,59 +80,78 @@ class Recorder:
             raise ValueError(
                 f"rows: found {under_way.tolist()} under way; a recording begins right after reset"
             )
+        elsewhere = chosen[self._simulation.ball_velocity[chosen].any(axis=1)]
+        elsewhere = np.union1d(elsewhere, chosen[state.coin_taken[chosen].any(axis=1)])
+        if len(elsewhere):
+            raise ValueError(
+                f"rows: found {elsewhere.tolist()} begun with a moving ball or without coins; what "
+                "is on record begins as the level says"
+            )
         positions = self._simulation.ball_position
-        now = checksums(self._simulation, chosen)
-        for row, checksum in zip(chosen.tolist(), now, strict=True):
+        for row in chosen.tolist():
             x, y, z = positions[row].tolist()
-            take = _Take((x, y, z), bool(state.control_delay_s[row] > 0.0), seed)
-            take.checksums.append(int(checksum))
-            self._takes[row] = take
+            self._takes[row] = _Take((x, y, z), bool(state.control_delay_s[row] > 0.0), seed)
+        self._check(chosen)
 
     def record(self, force_n: Float64, reward: Float64) -> None:
         """Remember a step that the simulation has just made; rows that it left alone are left out.
 
         Args:
-            force_n: (N, 2) newtons, as given to `Simulation.step`.
+            force_n: (N, 2) newtons, as given to `Simulation.step`; those of actions of the
+                simulation's mode, which `replay` makes of them again.
             reward: (N,) as it returned.
 
         Raises:
             ValueError: a row was reset or stepped meanwhile without the recorder being told.
         """
         steps = self._simulation.state.steps
-        made = [row for row, take in self._takes.items() if steps[row] != len(take.forces)]
+        made = [row for row, take in self._takes.items() if steps[row] != take.steps]
         if not made:
             return
-        rows = np.sort(np.array(made))
-        now = checksums(self._simulation, rows)
-        for row, checksum in zip(rows.tolist(), now, strict=True):
+        for row in made:
             take = self._takes[row]
-            if steps[row] != len(take.forces) + 1:
+            if steps[row] != take.steps + 1:
                 raise ValueError(
-                    f"row {row}: found it at step {steps[row]} after {len(take.forces)} recorded; "
+                    f"row {row}: found it at step {steps[row]} after {take.steps} recorded; "
                     "tell the recorder of every step and every reset"
                 )
-            x, y = force_n[row].tolist()
-            take.forces.append((x, y))
-            take.checksums.append(int(checksum))
+            take.steps += 1
+            take.forces.extend(force_n[row].tolist())
             take.total_reward += float(reward[row])
+        self._check(np.sort([row for row in made if steps[row] % self._every == 0]))
+
+    def _check(self, rows: Int64) -> None:
+        """Add a row of checksums to the takes of these rows."""
+        if len(rows):
+            for row, sums in zip(rows, checksums(self._simulation, rows, _NAMES), strict=True):
+                self._takes[int(row)].checksums.append(sums)
 
     def replay(self, row: int = 0) -> Replay:
         """Return a row's episode as far as it has come.
 
         Raises:
             KeyError: the row is not recorded.
-            ReplayError: it is too long for a replay.
+            ReplayError: it is too long for a replay, or a force was none of an action of the
+                simulation's mode.
+            ValueError: the row was reset or stepped meanwhile without the recorder being told.
         """
         simulation, take = self._simulation, self._takes[row]
-        if len(take.forces) > MAX_STEPS:
-            raise ReplayError(f"{len(take.forces)} steps are too many; allowed are {MAX_STEPS}")
+        steps, now = take.steps, int(simulation.state.steps[row])
+        if steps != now:
+            raise ValueError(f"row {row}: found it at step {now} after {steps} recorded")
+        if steps > MAX_STEPS:
+            raise ReplayError(f"{steps} steps are too many; allowed are {MAX_STEPS}")
+        sums = take.checksums
+        if steps % self._every:
+            sums = [*sums, checksums(simulation, np.array([row]), _NAMES)[0]]
+        force_n = np.array(take.forces).reshape(-1, 2)
         return Replay(
             level=simulation.compiled.level,
             options=Options.of(simulation.config),
             start=take.start,
             intro=take.intro,
-            force_n=np.array(take.forces, dtype=np.float64).reshape(-1, 2),
-            checksums=np.array(take.checksums, dtype=np.uint32),
+            actions=actions_of(simulation.config.action, force_n),
+            checksums=Checksums(self._every, _NAMES, np.array(sums)),
             result=result_of(simulation, row, take.total_reward),
             versions=Versions.here(),
             player=self._player,
@@ -135,26 +164,6 @@ def result_of(simulation: Simulation, row: int, total_reward: float) -> Result:
     results = {name: value[0].item() for name, value in simulation.results(np.array([row])).items()}
     truncated = bool(simulation.state.truncated[row])
     return Result(**results, truncated=truncated, total_reward=total_reward)
-
-
-def checksums(simulation: Simulation, rows: Int64) -> npt.NDArray[np.uint32]:
-    """Return a CRC-32 of each row's whole state, (n,) uint32.
-
-    It is of MuJoCo's integration state and of the arrays of `GameState` in their order, but for
-    the waypoint, which follows from the path, is kept with the ``shaped`` reward only, and changes
-    nothing but the reward, and but for the points, which are the coins taken. CRC-32 is meant for
-    accidents, which is what is looked for here.
-    """
-    snapshot = simulation.snapshot(rows)
-    game = (values for name, values in snapshot.game.items() if name not in ("waypoint", "points"))
-    table = np.concatenate(
-        [_bytes(values, len(rows)) for values in (snapshot.physics, *game)], axis=1
-    )
-    return np.array([zlib.crc32(row) for row in table], dtype=np.uint32)
-
-
-def _bytes(values: npt.NDArray[Any], count: int) -> npt.NDArray[np.uint8]:
-    return np.ascontiguousarray(values).reshape(count, -1).view(np.uint8)
 
 
 def place_at_starts(simulation: Simulation, starts: Float64, intro: bool) -> None:
@@ -180,20 +189,23 @@ def record_episode(
     seed: int | None = None,
     intro: bool = False,
     player: str = "",
+    check_every: int | None = None,
 ) -> Replay:
     """Play one episode to its end and return its replay.
 
     Args:
         config: of the game.
-        act: gives the keys' force, (1, 2) newtons, for the next step.
+        act: gives the keys' force, (1, 2) newtons, for the next step: that of an action of the
+            configured mode.
         seed: of the row's generator, as `RollerEnv.reset` takes it.
         intro: whether the keys work only after the intro.
         player: who plays, in words.
+        check_every: see `Recorder`.
     """
     simulation = Simulation(config)
     simulation.seed([seeding.np_random(seed)[0]])
     simulation.reset(intro=intro)
-    recorder = Recorder(simulation, player)
+    recorder = Recorder(simulation, player, check_every)
     recorder.begin(seed=seed)
     while not simulation.state.over[0]:
         force = act(simulation)
@@ -208,6 +220,7 @@ def replays_of(
     *,
     player: str = "",
     seeds: Sequence[int | None] | None = None,
+    intro: bool = False,
 ) -> list[Replay]:
     """Return replays of episodes of which only starts and forces were kept, by playing them again.
 
@@ -217,14 +230,16 @@ def replays_of(
     Args:
         config: they were played in.
         starts: (n, 3) the balls' centres at the beginning, metres.
-        forces: (T, 2) newtons for each, of any lengths; an episode that ends earlier is shorter.
+        forces: (T, 2) newtons for each, of any lengths, those of actions of the configured mode;
+            an episode that ends earlier is shorter.
         player: who played, in words.
         seeds: of each, if known.
+        intro: whether their keys worked only after the intro.
     """
     if len(forces) == 0:
         return []
     simulation = Simulation(replace(config, num_threads=1), len(forces))
-    place_at_starts(simulation, starts, intro=False)
+    place_at_starts(simulation, starts, intro)
     recorder = Recorder(simulation, player)
     for row in range(len(forces)):
         recorder.begin([row], seed=None if seeds is None else seeds[row])

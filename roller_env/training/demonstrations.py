@@ -19,7 +19,8 @@ from roller_env.game.rewards import RewardWeights
 from roller_env.level import load_level
 from roller_env.problems import shown
 from roller_env.replay import Replay, ReplayError, load_replay
-from roller_env.replay.experience import Experience, actions_of, experiences
+from roller_env.replay.actions import actions_of
+from roller_env.replay.experience import Experience, experiences
 from roller_env.replay.file import SUFFIX
 from roller_env.replay.scripted import PLAYER, meant
 from roller_env.training.config import TrainingConfig
@@ -107,6 +108,8 @@ def _from_replays(replays: Sequence[Replay], wanted: EnvConfig) -> list[Demonstr
             wanted.control_dt_s / e.replay.options.control_dt_s,
         )
         for e in tqdm(played, total=len(replays), desc="demonstrations", unit=" episodes")
+        # In an episode that was left in its intro, nothing was done.
+        if len(e)
     ]
 
 
@@ -193,6 +196,7 @@ def _from_minari(data_set: Any, wanted: EnvConfig) -> list[Demonstration]:
             ratio,
         )
         for episode in data_set.iterate_episodes()
+        if len(episode.actions)
     ]
 
 

@@ -32,7 +32,7 @@ def save_replays(
         The files.
 
     Raises:
-        RunError: an episode ended otherwise when it was played again.
+        RunError: an episode ended otherwise when it was played again; the others are written.
     """
     options = make_config(level=evaluation.level, **config.evaluation_options)
     replays = replays_of(
@@ -41,12 +41,15 @@ def save_replays(
         [episode.force_n for episode in evaluation.episodes],
         player=player,
     )
-    files = []
+    files, others = [], []
     for number, (episode, replay) in enumerate(zip(evaluation.episodes, replays, strict=True)):
         ended, again = (
             (game.success, game.fall, game.coins, game.time_s) for game in (episode, replay.result)
         )
         if ended != again:
-            raise RunError(f"episode {number}: found {again} played again; it had been {ended}")
+            others.append(f"episode {number}: found {again} played again; it had been {ended}")
+            continue
         files.append(save_replay(replay, directory / f"episode-{number:04d}{SUFFIX}"))
+    if others:
+        raise RunError("; ".join(others))
     return files

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.config import make_config
-from roller_env.game.actions import forces
+from roller_env.game.actions import DIRECTIONS, forces
 from roller_env.replay import Recorder, Replay, record_episode
 from roller_env.simulation import Simulation
 from tests.simulation.driving import simulation_of, wandering
@@ -21,13 +21,16 @@ Float64 = npt.NDArray[np.float64]
 @cache
 def wandered(level: str = "flat", seed: int = 0, intro: bool = False, **options: Any) -> Replay:
     """Return a replay of a ball pushed about at random in a level."""
+    check_every = options.pop("check_every", None)
     config = make_config(**{"level": level, "physics": "fast", "num_threads": 1} | options)
     pushes = wandering(1, seed)
 
     def act(_: Simulation) -> Float64:
         return next(pushes)
 
-    return record_episode(config, act, seed=seed, intro=intro, player="at random")
+    return record_episode(
+        config, act, seed=seed, intro=intro, player="at random", check_every=check_every
+    )
 
 
 def straight_on(level: Any, steps: int, direction: int = 1, **options: Any) -> Replay:
@@ -42,17 +45,20 @@ def straight_on(level: Any, steps: int, direction: int = 1, **options: Any) -> R
 
 
 def pushed_otherwise(played: Replay, step: int) -> Replay:
-    """Return a replay in which one step's force is not what was recorded."""
-    force = played.force_n.copy()
-    force[step, 0] += 0.5
-    return replace(played, force_n=force)
+    """Return a replay in which one step's direction is not what was recorded."""
+    actions = played.actions.copy()
+    actions[step] = (actions[step] + 4) % len(DIRECTIONS)
+    return replace(played, actions=actions)
 
 
 def same(one: Replay, other: Replay) -> bool:
     """Say whether two replays are equal in everything, to the bit."""
     plain = ("level", "options", "start", "intro", "result", "versions", "player", "seed")
+    sums, others = one.checksums, other.checksums
     return (
         all(getattr(one, name) == getattr(other, name) for name in plain)
-        and one.force_n.tobytes() == other.force_n.tobytes()
-        and one.checksums.tobytes() == other.checksums.tobytes()
+        and one.actions.dtype == other.actions.dtype
+        and one.actions.tobytes() == other.actions.tobytes()
+        and (sums.every, sums.quantities) == (others.every, others.quantities)
+        and np.array_equal(sums.table, others.table)
     )

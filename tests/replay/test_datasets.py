@@ -16,15 +16,18 @@ from roller_env.game.actions import forces
 from roller_env.game.rewards import RewardWeights
 from roller_env.level import load_level
 from roller_env.physics.presets import PRESETS, PhysicsPreset, physics_preset
-from roller_env.replay import ReplayError, record_episode
+from roller_env.play.session import GameSession, play_config
+from roller_env.replay import Replay, ReplayError, record_episode
 from roller_env.replay.datasets import (
+    NothingPlayed,
     check_prefix,
     environment_spec,
     to_minari,
     to_minari_by_level,
 )
+from roller_env.replay.keeper import ReplayKeeper
 from tests.builders import make_level
-from tests.replay.recording import straight_on, wandered
+from tests.replay.recording import pushed_otherwise, straight_on, wandered
 
 minari = pytest.importorskip("minari", reason="the extra 'demos' is not installed")
 
@@ -88,12 +91,73 @@ def test_a_data_set_is_not_overwritten() -> None:
 def test_what_was_played_on_several_levels_becomes_a_data_set_of_each() -> None:
     nothing = straight_on("gate", 0, physics="fast")
     played = [wandered("flat"), nothing, wandered("bridge"), wandered("flat", seed=1)]
-    assert to_minari_by_level(played, "roller/human") == [
-        "roller/human/flat-v0",
-        "roller/human/bridge-v0",
-    ]
+    written = to_minari_by_level(played, "roller/human")
+    assert written.names == ("roller/human/flat-v0", "roller/human/bridge-v0")
+    assert written.problems == ()
     assert minari.load_dataset("roller/human/flat-v0").total_episodes == 2
-    assert to_minari_by_level(played[:1], "roller/human") == ["roller/human/flat-v1"]
+    assert to_minari_by_level(played[:1], "roller/human").names == ("roller/human/flat-v1",)
+
+
+def left_in_the_intro(level: str, then_s: float = 0.0) -> list[Replay]:
+    """Return the games of somebody who presses R at once, and plays for ``then_s`` after that."""
+    keeper = ReplayKeeper()
+    session = GameSession(play_config(level, "fast"), seed=0, observers=[keeper])
+    session.start()
+    session.advance(0.1, "w")
+    session.restart()
+    for _ in range(round(then_s / 0.1)):
+        session.advance(0.1, "w")
+    session.close()
+    assert keeper.replays[0].intro
+    assert len(keeper.replays[0]) == 12
+    return keeper.replays
+
+
+def test_who_presses_r_in_the_intro_loses_no_data_set() -> None:
+    left = left_in_the_intro("flat")
+    written = to_minari_by_level([*left, wandered("bridge")], "roller/human")
+    assert written.names == ("roller/human/bridge-v0",)
+    assert written.problems == ()
+    with pytest.raises(NothingPlayed, match="level 'flat': the keys never worked"):
+        to_minari(left, "roller/flat/left-v0")
+
+
+def test_a_game_that_was_left_in_its_intro_is_no_episode_of_a_data_set() -> None:
+    played = left_in_the_intro("flat", then_s=0.5)
+    assert len(played) == 2
+    data_set = to_minari(played, "roller/flat/human-v0")
+    assert (data_set.total_episodes, data_set.total_steps) == (1, 60)
+
+
+def test_a_level_that_cannot_be_written_costs_no_other_its_data_set(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    create = minari.create_dataset_from_buffers
+
+    def full(name: str, **rest: Any) -> Any:
+        data_set = create(name, **rest)
+        if "bridge" in name:
+            raise OSError(28, "No space left on device")
+        return data_set
+
+    monkeypatch.setattr(minari, "create_dataset_from_buffers", full)
+    other = pushed_otherwise(wandered("gate", max_episode_steps=20), 3)
+    played = [other, wandered("bridge"), wandered("flat")]
+    written = to_minari_by_level(played, "roller/human")
+    assert written.names == ("roller/human/flat-v0",)
+    not_exact, no_space = written.problems
+    assert "data set roller/human/gate-v0 not written: 1 of 1 replays" in not_exact
+    assert "data set roller/human/bridge-v0 not written: [Errno 28] No space left" in no_space
+    # Nothing is left of what was begun, so that the name is free.
+    assert not (tmp_path / "roller" / "human" / "bridge-v0").exists()
+    monkeypatch.undo()
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    assert to_minari_by_level(played[1:2], "roller/human").names == ("roller/human/bridge-v0",)
+
+
+def test_a_directory_that_is_no_data_set_any_more_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "roller" / "human" / "flat-v0").mkdir(parents=True)
+    assert to_minari_by_level([wandered("flat")], "roller/human").names == ("roller/human/flat-v1",)
 
 
 def test_a_spec_says_all_of_an_environment_and_no_more() -> None:

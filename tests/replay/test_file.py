@@ -20,10 +20,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roller_env.level import load_level, shipped_levels
-from roller_env.replay import Replay, ReplayError, load_replay, save_replay
+from roller_env.play.session import GameSession, play_config
+from roller_env.replay import Checksums, Replay, ReplayError, load_replay, save_replay
 from roller_env.replay import file as replay_file
+from roller_env.replay.checksums import row_count
 from roller_env.replay.contents import MAX_PHYSICS_STEPS, MAX_STEPS, canonical_text
 from roller_env.replay.file import MAX_HEADER_BYTES, decode, encode
+from roller_env.replay.keeper import ReplayKeeper
+from roller_env.simulation import Simulation
 from tests.replay.recording import same, straight_on, wandered
 
 PLAYED = straight_on("gate", 12, physics="fast")
@@ -88,26 +92,53 @@ def test_what_was_written_is_read_to_the_bit(level: str, tmp_path: Path) -> None
 
 
 @given(
-    st.lists(st.tuples(*(2 * [st.floats(allow_nan=False, allow_infinity=False)])), max_size=40),
+    st.lists(st.integers(0, 8), max_size=40),
+    st.integers(1, 50),
     st.integers(0, 2**128 - 1) | st.none(),
-    st.text(max_size=200),
+    st.text(max_size=200).filter(str.isprintable),
 )
-def test_any_forces_are_kept_to_the_bit(
-    forces: list[tuple[float, float]], seed: int | None, player: str
+def test_any_actions_are_kept_to_the_bit(
+    directions: list[int], every: int, seed: int | None, player: str
 ) -> None:
-    force = np.array(forces, dtype=np.float64).reshape(-1, 2)
-    checksums = np.arange(len(force) + 1, dtype=np.uint32) * 0x9E3779B1
-    try:
-        text = player.encode()
-    except UnicodeEncodeError:
-        text = b""
-    played = replace(PLAYED, force_n=force, checksums=checksums, seed=seed, player=text.decode())
+    rows = row_count(len(directions), every)
+    table = (np.arange(rows * 3, dtype=np.uint32) * 0x9E3779B1).reshape(rows, 3)
+    sums = Checksums(every, PLAYED.checksums.quantities[2:5], table)
+    actions = np.array(directions, dtype=np.int64)
+    played = replace(PLAYED, actions=actions, checksums=sums, seed=seed, player=player)
     assert same(decode(encode(played)), played)
+
+
+@pytest.mark.parametrize("action", ["keys", "force"])
+def test_every_kind_of_action_is_kept_to_the_bit(action: str) -> None:
+    played = straight_on("gate", 12, direction=2, physics="fast", action=action)
+    again = decode(encode(played))
+    assert same(again, played)
+    assert np.array_equal(again.force_n, played.force_n)
+    assert again.force_n[0, 1] > 0.0
+
+
+def test_a_minute_of_a_persons_game_takes_a_few_kilobytes() -> None:
+    rng = np.random.default_rng(0)
+    keeper = ReplayKeeper()
+    session = GameSession(
+        play_config("classic"), skip_intro=True, seed=1, observers=[keeper], agent=None
+    )
+    session.start()
+    # Left and right, so that it stays on the level, with other keys three times a second.
+    for held in rng.choice(["", "a", "d", "a", "d"], 180):
+        session.advance(1 / 6, str(held))
+        session.advance(1 / 6, str(held))
+    session.close()
+    steps = sum(map(len, keeper.replays))
+    assert steps > 5000
+    size = sum(len(encode(replay)) for replay in keeper.replays)
+    level = len(gzip.compress(keeper.replays[0].level_text.encode()))
+    assert (size - level) / (steps / 240) * 60 < 6000
 
 
 def test_a_file_tells_what_it_is_without_this_package() -> None:
     header, body = unpacked()
-    assert (header["kind"], header["format"], header["steps"]) == ("roller-replay", 1, 12)
+    assert (header["kind"], header["format"], header["steps"]) == ("roller-replay", 2, 12)
     assert json.loads(body.partition(b"\n")[0])["name"] == "gate"
 
 
@@ -177,7 +208,25 @@ def test_a_header_with_anything_in_a_field_is_refused_or_read(value: Any, field:
         (lambda h: h.update(level_bytes=h["level_bytes"] - 16), "longer or shorter"),
         (lambda h: h.update(level_bytes=h["level_bytes"] - 16, steps=13), "longer or shorter"),
         (lambda h: h.update(level_sha256="0" * 64), "does not match its hash"),
-        (lambda h: h.update(format=2), "found format 2; this version of Roller reads format 1"),
+        (lambda h: h.update(format=3), "found format 3; this version of Roller plays format 2"),
+        (lambda h: h.update(format=True), "found format True; this version"),
+        (lambda h: h.update(format=1), "scripts/replay.py FILE --convert NEW makes a new file"),
+        (lambda h: h.update(encoding="f8"), "longer or shorter"),
+        (lambda h: h.update(encoding="f8", steps=1), "longer or shorter"),
+        (lambda h: h.update(encoding="O"), "encoding"),
+        (lambda h: h.update(check_every=0), "check_every"),
+        (lambda h: h.update(check_every=2**62), "check_every"),
+        (lambda h: h.update(check_every=12), "longer or shorter"),
+        (lambda h: h.update(check_every=1, steps=MAX_STEPS), "rows of checksums"),
+        (lambda h: h.update(quantities=["ball_position"] * 16), "each once"),
+        (lambda h: h["quantities"].__setitem__(3, "luck"), "must be some of ball_position"),
+        (lambda h: h.update(quantities=["x"] * 1000), "quantities"),
+        (lambda h: h.update(quantities=[]), "longer or shorter"),
+        (lambda h: h.update(player="\x1b]0;title\x07"), "cannot be printed"),
+        (lambda h: h["versions"].update(mujoco="4\x1b[2J"), "cannot be printed"),
+        (lambda h: h["versions"].update(engine="rigid"), "engine"),
+        (lambda h: h["versions"].update(rules=-1), "rules"),
+        (lambda h: h["options"].update(action="force"), "is written"),
         (lambda h: h.update(kind="pickle"), "not a replay"),
         (lambda h: h.update(start=[1e6, 0.0, 0.0]), "the ball starts at"),
         (lambda h: h.update(start=[0.0, 0.0, 99.0]), "the ball starts at"),
@@ -202,10 +251,10 @@ def test_a_header_that_lies_is_refused_with_the_field_it_lies_in(
 
 def test_a_file_that_swells_when_it_is_unpacked_is_refused_before_it_does() -> None:
     header, body = unpacked()
-    swollen = packed(header, body + bytes(200 * 2**20))
+    swollen = packed(header, body + bytes(64 * 2**20))
     assert len(swollen) < 2**20
     assert "longer or shorter" in refusal(swollen)
-    assert "header" in refusal(gzip.compress(b" " * 100 * 2**20))
+    assert "header" in refusal(gzip.compress(b" " * 32 * 2**20))
     assert "not a replay" in refusal(gzip.compress(b"[" * (MAX_HEADER_BYTES - 2) + b"\n"))
 
 
@@ -230,19 +279,29 @@ def test_a_level_that_is_none_is_refused_though_its_hash_is_right() -> None:
 def test_a_game_that_would_take_days_is_refused() -> None:
     steps = MAX_PHYSICS_STEPS // 6 + 1
     with pytest.raises(ReplayError, match="too long a replay"):
-        replace(
-            PLAYED,
-            force_n=np.zeros((steps, 2)),
-            checksums=np.zeros(steps + 1, dtype=np.uint32),
-        )
+        replace(PLAYED, actions=np.zeros(steps, dtype=np.int64))
 
 
-@pytest.mark.parametrize("wrong", [np.nan, np.inf])
-def test_forces_that_are_no_numbers_are_refused(wrong: float) -> None:
-    header, body = unpacked()
-    at = header["level_bytes"] + 1
-    force = np.array([wrong]).astype("<f8").tobytes()
-    assert "finite" in refusal(packed(header, body[:at] + force + body[at + 8 :]))
+@pytest.mark.parametrize(
+    ("action", "wrong", "message"),
+    [
+        ("directions", b"\x09", "step 0, 9, is none of 'directions', which has 0 to 8"),
+        ("keys", b"\x10", "step 0, 16, is none of 'keys', which has key codes 0 to 15"),
+        *(
+            ("force", np.array([push], "<f4").tobytes(), "is none of 'force', which has -1 to 1")
+            for push in (np.nan, np.inf, 200.0, 3e38, 1.0000001)
+        ),
+    ],
+)
+def test_what_no_key_can_do_is_refused_before_anything_is_played(
+    action: str, wrong: bytes, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    played = straight_on("gate", 12, direction=2, physics="fast", action=action)
+    header, _, body = gzip.decompress(encode(played)).partition(b"\n")
+    at = json.loads(header)["level_bytes"] + 1
+    changed_body = body[:at] + wrong + body[at + len(wrong) :]
+    monkeypatch.setattr(Simulation, "step", None)
+    assert message in refusal(gzip.compress(header + b"\n" + changed_body))
 
 
 def test_nothing_is_unpickled(tmp_path: Path) -> None:
@@ -287,6 +346,32 @@ def test_a_file_too_large_is_not_read_whole(
         load_replay(file)
 
 
-def test_a_name_too_long_is_refused_before_it_is_written() -> None:
+def test_a_name_too_long_or_of_escape_characters_is_refused_before_it_is_written() -> None:
     with pytest.raises(ReplayError, match="found 201 characters"):
         replace(PLAYED, player=201 * "x")
+    with pytest.raises(ReplayError, match="must be characters that print"):
+        replace(PLAYED, player="\x1b[2J")
+
+
+def test_whoever_is_killed_or_has_no_space_while_writing_leaves_the_file_of_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = save_replay(PLAYED, tmp_path / "game.replay")
+
+    def killed(path: Path, content: bytes) -> None:
+        with path.open("wb") as stream:
+            stream.write(content[:99])
+        raise KeyboardInterrupt
+
+    def full(path: Path, content: bytes) -> None:
+        with path.open("wb") as stream:
+            stream.write(content[:99])
+        raise OSError(28, "No space left on device")
+
+    for failing, error in ((full, OSError), (killed, KeyboardInterrupt)):
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "write_bytes", failing)
+            with pytest.raises(error):
+                save_replay(wandered("flat"), file)
+        assert same(load_replay(file), PLAYED)
+        assert failing is killed or list(tmp_path.iterdir()) == [file]

@@ -9,11 +9,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from roller_env.game.version import RULES_VERSION
+from roller_env.physics.version import PHYSICS_VERSION
 from roller_env.replay import Playback, frames, verify
+from roller_env.replay.checksums import row_count
 from tests.replay.recording import pushed_otherwise, wandered
-from tests.simulation.driving import bits, wandering
+from tests.simulation.driving import bits
 
 LONG = wandered("gate", max_episode_steps=120)
+CHECKED = wandered("gate", max_episode_steps=120, check_every=1)
 
 
 @pytest.fixture(scope="module")
@@ -75,23 +79,61 @@ def test_there_is_a_frame_for_every_moment_with_what_is_drawn_in_it() -> None:
 
 @settings(max_examples=12)
 @given(step=st.integers(0, len(LONG) - 1))
-def test_the_step_at_which_a_replay_parts_is_named(step: int) -> None:
+def test_the_first_checksum_that_is_not_the_games_is_named(step: int) -> None:
+    every = LONG.checksums.every
+    assert every == 10
     verification = verify(pushed_otherwise(LONG, step))
-    assert verification.parted_at == step + 1
+    assert verification.last_match_step == step // every * every
+    assert verification.first_mismatch_step == step // every * every + every
     assert not verification.is_exact
-    assert f"parts at step {step + 1} of {len(LONG)}" in str(verification)
+    assert f"another game at step {verification.first_mismatch_step} of {len(LONG)}" in str(
+        verification
+    )
     assert "no version differs" in str(verification)
 
 
-def test_another_start_parts_at_step_0() -> None:
+@settings(max_examples=12)
+@given(step=st.integers(0, len(CHECKED) - 1))
+def test_with_a_checksum_of_every_step_the_very_step_and_what_was_other_in_it_are_named(
+    step: int,
+) -> None:
+    verification = verify(pushed_otherwise(CHECKED, step))
+    assert verification.first_mismatch_step == step + 1
+    assert verification.last_match_step == step
+    assert "ball_velocity" in verification.mismatches
+    assert "coins_collected" not in verification.mismatches
+    assert f"not yet at step {step}, in " in str(verification)
+    assert "ball_velocity" in str(verification)
+
+
+def test_another_start_is_named_as_the_balls_position_at_step_0() -> None:
     x, y, z = LONG.start
-    assert verify(replace(LONG, start=(x + 1e-9, y, z))).parted_at == 0
+    verification = verify(replace(LONG, start=(x + 1e-9, y, z)))
+    assert verification.first_mismatch_step == 0
+    assert verification.last_match_step is None
+    assert verification.mismatches == ("ball_position",)
+
+
+def test_a_quantity_alone_that_is_not_the_games_is_named() -> None:
+    table = LONG.checksums.table.copy()
+    table[3, LONG.checksums.quantities.index("gates_opening")] ^= 1
+    verification = verify(replace(LONG, checksums=replace(LONG.checksums, table=table)))
+    assert verification.mismatches == ("gates_opening",)
+    assert verification.first_mismatch_step == 30
+
+
+def test_a_replay_of_before_a_quantity_was_added_is_compared_in_those_it_has() -> None:
+    sums = LONG.checksums
+    fewer = replace(sums, quantities=sums.quantities[:3], table=sums.table[:, :3])
+    assert verify(replace(LONG, checksums=fewer)).is_exact
+    assert not verify(pushed_otherwise(replace(LONG, checksums=fewer), 3)).is_exact
 
 
 def test_what_is_of_another_version_is_named() -> None:
     older = LONG.versions.model_copy(update={"mujoco": "3.9.9", "machine": "aarch64"})
     verification = verify(replace(pushed_otherwise(LONG, 7), versions=older))
     assert len(verification.differences) == 2
+    assert "the rules" not in str(verification)
     assert "recorded with mujoco 3.9.9, not " in str(verification)
     assert "machine aarch64, not " in str(verification)
     exact = verify(replace(LONG, versions=older))
@@ -99,19 +141,38 @@ def test_what_is_of_another_version_is_named() -> None:
     assert "though recorded with mujoco 3.9.9" in str(exact)
 
 
+def test_a_replay_of_other_rules_or_physics_says_so() -> None:
+    older = LONG.versions.model_copy(update={"rules": 0, "physics": 0})
+    verification = verify(replace(pushed_otherwise(LONG, 7), versions=older))
+    assert verification.differences == (
+        f"rules 0, not {RULES_VERSION}",
+        f"physics 0, not {PHYSICS_VERSION['mujoco']}",
+    )
+    assert f"recorded with rules 0, not {RULES_VERSION}" in str(verification)
+
+
 def test_a_result_that_is_not_the_games_is_noticed() -> None:
     richer = LONG.result.model_copy(update={"coins": LONG.result.coins + 1})
     verification = verify(replace(LONG, result=richer))
-    assert verification.parted_at is None
+    assert verification.first_mismatch_step is None
     assert not verification.is_exact
     assert "another result" in str(verification)
 
 
-def test_more_forces_than_the_game_has_steps_change_nothing_and_are_noticed() -> None:
+def test_actions_after_the_end_of_the_game_are_no_game() -> None:
     played = wandered("flat")
-    pushes = wandering(1, 9)
-    longer = np.concatenate([played.force_n, *(next(pushes) for _ in range(5))])
-    checksums = np.concatenate([played.checksums, np.zeros(5, dtype=np.uint32)])
-    verification = verify(replace(played, force_n=longer, checksums=checksums))
-    assert verification.parted_at == len(played) + 1
+    sums = played.checksums
+    # As somebody writes it who knows that nothing moves any more.
+    rows = row_count(len(played) + 25, sums.every)
+    still = np.repeat(sums.table[-1:], rows - len(sums.table), axis=0)
+    table = np.concatenate([sums.table, still])
+    longer = replace(
+        played,
+        actions=np.concatenate([played.actions, np.ones(25, dtype=np.int64)]),
+        checksums=replace(sums, table=table),
+    )
+    verification = verify(longer)
+    assert not verification.is_exact
+    assert verification.first_mismatch_step == len(played) + 1
+    assert "the game is over before it" in str(verification)
     assert verification.result == played.result

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import warnings
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from gymnasium.vector import AutoresetMode
 
 from roller_env.envs.single import RollerEnv
 from roller_env.envs.vector import RollerVectorEnv
-from roller_env.game.actions import forces
+from roller_env.game.actions import ActionMode, forces
 from roller_env.game.rules import INTRO_S
 from roller_env.level import shipped_levels
-from roller_env.replay import Recorder, replays_of, verify
+from roller_env.replay import Recorder, ReplayError, replays_of, verify
 from tests.builders import make_level
-from tests.replay.recording import same, straight_on, wandered
+from tests.replay.recording import pushed_otherwise, same, straight_on, wandered
 from tests.simulation.driving import simulation_of, wandering
 
 
@@ -30,16 +31,25 @@ def test_a_game_of_any_level_is_the_same_when_played_again(level: str, reward: s
 
 
 @pytest.mark.parametrize("physics", ["default", "accurate"])
-@pytest.mark.parametrize("action", ["keys", "force"])
-def test_any_preset_and_any_force_are_on_record(physics: str, action: str) -> None:
+@pytest.mark.parametrize("action", ["directions", "keys", "force"])
+def test_any_preset_and_any_action_are_on_record(physics: str, action: ActionMode) -> None:
     rng = np.random.default_rng(1)
     simulation = simulation_of("gate", physics=physics, action=action, num_threads=1)
     recorder = Recorder(simulation)
     recorder.begin()
-    for _ in range(60):
-        force = rng.uniform(-5.0, 5.0, (1, 2))
+    of_mode: dict[str, npt.NDArray[Any]] = {
+        "directions": rng.integers(9, size=60),
+        "keys": rng.integers(2, size=(60, 4)),
+        "force": rng.uniform(-1.0, 1.0, (60, 2)).astype(np.float32),
+    }
+    actions = of_mode[action]
+    for done in actions:
+        force = forces(action, done[None])
         recorder.record(force, simulation.step(force).reward)
     played = recorder.replay()
+    if action != "keys":  # Opposite keys cancel, and are then as if neither was held.
+        assert np.array_equal(played.actions, actions)
+    assert np.array_equal(played.force_n, forces(action, actions))
     assert verify(played).is_exact
     assert played.result.outcome == "not ended"
     assert played.options.physics.name == physics
@@ -141,25 +151,62 @@ def test_games_of_which_starts_and_forces_were_kept_become_the_replays_they_woul
     assert all(same(one, other) for one, other in zip(played, again, strict=True))
 
 
+def test_games_without_a_step_are_replays_without_one() -> None:
+    starts = np.array([wandered().start, wandered("flat", seed=1).start])
+    for steps in (0, 3):
+        pushes = [np.zeros((0, 2)), np.zeros((steps, 2))]
+        none, some = replays_of(wandered().config(), starts, pushes)
+        assert (len(none), len(some)) == (0, steps)
+        assert verify(none).is_exact
+        assert verify(some).is_exact
+
+
 def test_no_games_are_no_replays() -> None:
     assert replays_of(wandered().config(), np.zeros((0, 3)), []) == []
 
 
 def test_a_game_whose_physics_fails_is_on_record_to_its_end() -> None:
-    level = make_level(gravity=0.001, ball={"mass_kg": 0.001}, time_limit_s=20.0)
-    simulation = simulation_of(level, num_threads=1, action="force")
-    recorder = Recorder(simulation)
-    recorder.begin()
-    for force in np.zeros((1, 2)), np.full((1, 2), 1e30):
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            recorder.record(force, simulation.step(force).reward)
-    assert "diverged" in str(caught[-1].message)
-    played = recorder.replay()
+    # So strong a pad throws so light a ball further than MuJoCo counts.
+    pad = {"at": [0.0, 0.0, 0.1], "size": [2.0, 2.0, 0.2], "force_n": 1e6}
+    start = {"at": (0.0, 0.0, 0.7)}
+    level = make_level(start=start, ball={"mass_kg": 0.001}, lift_pads=[pad], time_limit_s=20.0)
+    with pytest.warns(RuntimeWarning, match="diverged"):
+        played = straight_on(level, 150, direction=0, physics="fast")
     assert played.result.diverged
-    assert len(played) == 2
+    assert 50 < len(played) < 150
     with pytest.warns(RuntimeWarning, match="diverged"):
         assert verify(played).is_exact
+
+
+def test_a_force_that_nobody_can_make_is_not_put_on_record() -> None:
+    for action, newtons in (("directions", 2.0), ("keys", 200.0), ("force", 1e308)):
+        simulation = simulation_of("flat", physics="fast", action=action)
+        recorder = Recorder(simulation)
+        recorder.begin()
+        reward = simulation.step(np.zeros((1, 2))).reward
+        recorder.record(np.array([[newtons, 0.0]]), reward)
+        with pytest.raises(ReplayError, match=f"step 0, .* is no action of mode '{action}'"):
+            recorder.replay()
+
+
+@pytest.mark.parametrize("steps", [0, 1, 9, 10, 11, 20])
+def test_the_beginning_and_the_end_have_checksums_however_long_it_is(steps: int) -> None:
+    played = straight_on("flat", steps, physics="fast")
+    assert played.checksums.every == 10
+    assert len(played.checksums.table) == len({*range(0, steps, 10), 0, steps})
+    assert verify(played).is_exact
+    assert steps == 0 or not verify(pushed_otherwise(played, steps - 1)).is_exact
+
+
+def test_a_game_that_was_reset_meanwhile_is_not_passed_off_as_the_one_on_record() -> None:
+    simulation = simulation_of("flat", physics="fast")
+    recorder = Recorder(simulation)
+    recorder.begin()
+    force = forces("directions", [1])
+    recorder.record(force, simulation.step(force).reward)
+    simulation.reset()
+    with pytest.raises(ValueError, match="found it at step 0 after 1 recorded"):
+        recorder.replay()
 
 
 def test_a_recording_begins_at_a_beginning() -> None:
@@ -169,6 +216,23 @@ def test_a_recording_begins_at_a_beginning() -> None:
     with pytest.raises(ValueError, match=r"found \[0, 2\] under way"):
         Recorder(simulation).begin([0, 1, 2])
     Recorder(simulation).begin([1])
+
+
+def test_a_game_that_was_put_elsewhere_is_no_game_of_the_level() -> None:
+    simulation = simulation_of("flat", num_envs=2, physics="fast")
+    snapshot = simulation.snapshot()
+    snapshot.game["coin_taken"][1, 0] = True
+    simulation.restore(snapshot)
+    with pytest.raises(ValueError, match=r"found \[1\] begun with a moving ball or without coins"):
+        Recorder(simulation).begin([0, 1])
+    snapshot = simulation.snapshot(np.array([0]))
+    # MuJoCo's state is time, positions and then velocities.
+    velocity = 1 + simulation.compiled.model.nq + simulation.compiled.ball_qvel
+    snapshot.physics[0, velocity] = 1.0
+    simulation.restore(snapshot)
+    assert simulation.ball_velocity[0].tolist() == [1.0, 0.0, 0.0]
+    with pytest.raises(ValueError, match=r"found \[0\] begun with a moving ball"):
+        Recorder(simulation).begin([0])
 
 
 def test_a_step_that_the_recorder_was_not_told_of_is_noticed() -> None:

@@ -17,7 +17,10 @@ from tests.builders import make_level
 from tests.replay.recording import wandered
 
 MAX_BYTES = 20_000
-REMEDY = "make them anew with scripts/make_demonstrations.py"
+REMEDY = (
+    "if that is meant, raise RULES_VERSION or PHYSICS_VERSION and make them anew with "
+    "scripts/make_demonstrations.py"
+)
 
 places = st.tuples(*(3 * [st.floats(-50.0, 50.0)]))
 

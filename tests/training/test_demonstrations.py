@@ -53,6 +53,12 @@ def test_an_episode_is_what_the_trainings_environment_gives(replays: Path) -> No
             assert reward == demonstration.rewards[step]
 
 
+def test_a_game_that_was_left_in_its_intro_is_no_demonstration(replays: Path) -> None:
+    left = wandered("flat", seed=7, intro=True, max_episode_steps=20)
+    save_replay(left, replays / "left.replay")
+    assert len(load_demonstrations(str(replays), training())) == 3
+
+
 def test_keys_held_for_shorter_steps_than_the_trainings_are_thinned(tmp_path: Path) -> None:
     config = make_config(
         level="flat", physics="fast", control_dt_s=1 / 60, max_episode_steps=61, num_threads=1

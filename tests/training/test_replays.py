@@ -52,3 +52,7 @@ def test_an_episode_that_does_not_come_out_the_same_is_not_passed_off_as_it(
     richer = replace(evaluation, episodes=(replace(first, coins=first.coins + 1), *others))
     with pytest.raises(RunError, match=r"episode 0: found .* it had been"):
         save_replays(richer, CONFIG, tmp_path, "nobody")
+    # The others are kept.
+    assert sorted(file.name for file in tmp_path.iterdir()) == [
+        f"episode-{number:04d}.replay" for number in range(1, 12)
+    ]

@@ -1,0 +1,119 @@
+"""Games of before, played again and recorded anew: of an older file, or after a change."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.config import EnvConfig, make_config
+from roller_env.level import Level
+from roller_env.replay.actions import actions_of
+from roller_env.replay.contents import Options, Replay, Result, check_game
+from roller_env.replay.errors import ReplayError
+from roller_env.replay.file import Header, Header2, read_whole, replay_of, unpack
+from roller_env.replay.recorder import replays_of
+
+Float64 = npt.NDArray[np.float64]
+
+_FORCE: Final = np.dtype(("<f8", 2))
+_CHECKSUM_BYTES: Final = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Format1:
+    """What remains of a replay of format 1; its attributes are those of `Replay`.
+
+    Its forces could be any, so they are yet to be seen to be actions. Its checksums are left out:
+    they are of how the game was kept in memory then.
+    """
+
+    level: Level
+    options: Options
+    start: tuple[float, float, float]
+    intro: bool
+    force_n: Float64
+    result: Result
+    player: str
+    seed: int | None
+
+
+class _Header1(Header):
+    format: Literal[1] = 1
+    versions: dict[str, Any]
+
+    @property
+    def numbers_bytes(self) -> int:
+        """Bytes after the level's line."""
+        return self.steps * _FORCE.itemsize + (self.steps + 1) * _CHECKSUM_BYTES
+
+
+def load_any(file: str | os.PathLike[str]) -> Replay | Format1:
+    """Read a replay of any format there has been.
+
+    Raises:
+        ReplayError: it is none; one line, with its name.
+    """
+    path = Path(file)
+    try:
+        header, level, numbers = unpack(read_whole(path), (Header2, _Header1))
+        if isinstance(header, Header2):
+            return replay_of(header, level, numbers)
+        check_game(level, header.options, header.start, header.steps)
+    except ReplayError as error:
+        raise ReplayError(f"{path}: {error}") from None
+    forces = numbers[: header.steps * _FORCE.itemsize]
+    return Format1(
+        level=level,
+        options=header.options,
+        start=header.start,
+        intro=header.intro,
+        force_n=np.frombuffer(forces, "<f8").astype(np.float64).reshape(-1, 2),
+        result=header.result,
+        player=header.player,
+        seed=header.seed,
+    )
+
+
+def record_anew(played: Replay | Format1, config: EnvConfig | None = None) -> Replay:
+    """Play a recording's actions again here and return the replay of that, if it ends the same.
+
+    The same end is the same outcome, coins, score, time and reward. That the same states lead to
+    it is known only of a replay that `verify` finds exact.
+
+    Args:
+        played: what was recorded.
+        config: to play it in; by default as it was recorded.
+
+    Raises:
+        ReplayError: a force is none of an action of the configured mode, which is found before
+            anything is played; or the game ends otherwise.
+    """
+    if config is None:
+        config = make_config(level=played.level, num_threads=1, **played.options.keywords())
+    actions_of(config.action, played.force_n)
+    (replay,) = replays_of(
+        config,
+        np.array([played.start]),
+        [played.force_n],
+        player=played.player,
+        seeds=[played.seed],
+        intro=played.intro,
+    )
+    if replay.result != played.result:
+        raise ReplayError(
+            f"the game on record ended in {_told(played.result)}; played again here, it ends in "
+            f"{_told(replay.result)}"
+        )
+    return replay
+
+
+def _told(result: Result) -> str:
+    return (
+        f"{result.outcome!r} after {result.time_s:.2f} s with {result.coins} coins and a reward of "
+        f"{result.total_reward:g}"
+    )
