@@ -17,7 +17,7 @@ PEERS  := .venv-peers
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup train play test lint format benchmark clean
+.PHONY: help setup train play test lint format docs benchmark clean
 .DELETE_ON_ERROR:
 
 help: ## show this list
@@ -38,7 +38,7 @@ $(READY): pyproject.toml constraints.txt
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
 		--constraint constraints.txt hatchling editables
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
-		--constraint constraints.txt --no-build-isolation --editable '.[train,lab,play,sound,video,demos,dev]'
+		--constraint constraints.txt --no-build-isolation --editable '.[train,lab,play,sound,video,demos,docs,dev]'
 	@$(BIN)/python -m roller_env
 	@touch $(READY)
 	@echo "$(VENV) is ready."
@@ -63,6 +63,10 @@ format: $(READY) ## let ruff format the code and mend what it can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
+docs: $(READY) ## build the documentation into site/; a dead link is an error
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "site/index.html"
+
 benchmark: $(READY) $(PEERS)/.ready ## measure against physics alone and other environments
 	@$(BIN)/python scripts/benchmark.py $(ARGS)
 
@@ -73,5 +77,5 @@ $(PEERS)/.ready: scripts/benchmark-peers.txt
 	@touch $@
 
 clean: ## remove the environments and caches; runs/ stays
-	rm -rf $(VENV) $(PEERS) build dist .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(PEERS) build dist site .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
