@@ -15,7 +15,7 @@ from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.config import MAX_ENVS, EnvConfig
 from roller_env.divergence import report
 from roller_env.game import observations, rewards, rules, sweep
-from roller_env.game.slabs import Placement
+from roller_env.game.slabs import Bodies
 from roller_env.game.state import GameState, score_percent
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level, load_level
@@ -407,8 +407,8 @@ class Simulation:
         """Step ``rows`` (None: all), whose state and level data are given; return the rewards."""
         every: Int64 | slice = slice(None) if rows is None else rows
         before = self._stepper.state[every].copy()
-        placement = self._placement(every) if rules.anything_moves(state) else None
-        controls = rules.controls(state, table, force_n, placement, self.duration_s)
+        bodies = self._bodies(every) if rules.anything_moves(state) else None
+        controls = rules.controls(state, table, force_n, bodies, self.duration_s)
         self._set_controls(every, controls)
         hanging = controls.hanging_s if controls.hanging_s.any() else None
         path = self._stepper.advance(rows) if hanging is None else self._let_go(rows, hanging)
@@ -432,10 +432,10 @@ class Simulation:
             reward += self._shaping(every, state, table, motion.ball[:, -1])
         return reward
 
-    def _placement(self, rows: Int64 | slice) -> Placement:
+    def _bodies(self, rows: Int64 | slice) -> Bodies:
         """Return where the ball and the slabs of ``rows`` are; copies, alike to the compiler."""
         qpos, act, compiled = self._stepper.qpos[rows], self._stepper.act[rows], self.compiled
-        return Placement(
+        return Bodies(
             ball=self._position[rows].copy(),
             velocity=self._velocity[rows].copy(),
             plate=qpos[:, compiled.plate_qpos].copy(),

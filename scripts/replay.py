@@ -19,9 +19,9 @@ from typing import Annotated, Literal
 import tyro
 
 from roller_env.game.cameras import MODES
-from roller_env.problems import printable
 from roller_env.level import load_level, shipped_levels
 from roller_env.physics.presets import PRESETS
+from roller_env.problems import printable
 from roller_env.replay import (
     Replay,
     ReplayError,

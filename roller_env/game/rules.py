@@ -61,12 +61,12 @@ def controls(
     state: GameState,
     table: LevelTable,
     key_force_n: Float64,
-    placement: slabs.Placement | None,
+    bodies: slabs.Bodies | None,
     duration_s: float,
 ) -> Controls:
     """Return what the actuators do in the next step, given the keys' force (N, 2).
 
-    ``placement`` is needed only where `anything_moves`.
+    ``bodies`` is needed only where `anything_moves`.
 
     Timers that end within the step act for their share of it, so that no impulse depends on the
     length of the control step.
@@ -86,7 +86,7 @@ def controls(
         result.force_n,
         result.hanging_s,
     )
-    if placement is None:
+    if bodies is None:
         return result
     slabs.lower(
         duration_s,
@@ -95,10 +95,10 @@ def controls(
         table.centres(Kind.PLATE),
         table.halves(Kind.PLATE),
         table.plate_heading,
-        placement.plate,
-        placement.plate_aim,
-        placement.ball,
-        placement.velocity,
+        bodies.plate,
+        bodies.plate_aim,
+        bodies.ball,
+        bodies.velocity,
         table.ball_radius,
         result.plate_velocity,
     )
@@ -109,10 +109,10 @@ def controls(
         table.gate_centre,
         table.gate_half,
         table.gate_heading,
-        placement.gate,
-        placement.gate_aim,
-        placement.ball,
-        placement.velocity,
+        bodies.gate,
+        bodies.gate_aim,
+        bodies.ball,
+        bodies.velocity,
         table.ball_radius,
         result.gate_velocity,
     )

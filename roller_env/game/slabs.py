@@ -29,7 +29,7 @@ GAP_M: Final = 0.001
 
 
 @dataclass(slots=True, eq=False)
-class Placement:
+class Bodies:
     """Where the ball and the slabs are when a control step begins.
 
     Displacements are from the slabs' ``at``, metres, <= 0.

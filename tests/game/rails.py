@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from roller_env.game import rules, sweep
-from roller_env.game.slabs import Placement
+from roller_env.game.slabs import Bodies
 from roller_env.game.state import GameState
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level
@@ -34,15 +34,15 @@ class Rails:
         self._ball = self.table.start.copy()
 
     @property
-    def placement(self) -> Placement:
+    def bodies(self) -> Bodies:
         """Where the balls and slabs are; on rails the slabs trail nothing."""
         still = np.zeros_like(self._ball)
-        return Placement(self._ball, still, self.plate, self.gate, self.plate, self.gate)
+        return Bodies(self._ball, still, self.plate, self.gate, self.plate, self.gate)
 
     def follow(self, path: Float64) -> sweep.Events:
         """Let one control step pass on a path, (N, S + 1, 3) metres; struck plates sink."""
         keys = np.zeros((len(path), 2))
-        controls = rules.controls(self.state, self.table, keys, self.placement, self.step_s)
+        controls = rules.controls(self.state, self.table, keys, self.bodies, self.step_s)
         self.plate = np.maximum(
             self.plate + controls.plate_velocity * self.step_s, self.table.plate_stop
         )

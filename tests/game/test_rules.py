@@ -114,9 +114,9 @@ def test_what_begins_in_a_step_acts_from_the_next() -> None:
     pad = {"at": (2.0, 0.0, 100.0), "size": (1.0, 1.0, 1.0)}
     rails = Rails(sky_level(lift_pads=[pad]))
     keys = np.zeros((1, 2))
-    assert controls(rails.state, rails.table, keys, rails.placement, 0.05).force_n[0, 2] == 0.0
+    assert controls(rails.state, rails.table, keys, rails.bodies, 0.05).force_n[0, 2] == 0.0
     rails.go((2.0, 0.0, 100.0))
-    assert controls(rails.state, rails.table, keys, rails.placement, 0.05).force_n[
+    assert controls(rails.state, rails.table, keys, rails.bodies, 0.05).force_n[
         0, 2
     ] == pytest.approx(12.7)
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.level import load_level
 from roller_env.level.load import levels_directory
-from tests.envs.test_making import BAD
+from tests.envs.test_making import BAD, WRONG_ACTIONS
 
 
 @pytest.mark.parametrize("kind", ["name", "string", "path", "level"])
@@ -32,3 +33,16 @@ def test_a_bad_option_is_one_error_that_says_what_and_what_would_be_right(
 def test_a_number_of_games_that_is_none_is_refused(num_envs: Any) -> None:
     with pytest.raises(ValueError, match=r"num_envs: found .*; must be"):
         RollerVecEnv("flat", num_envs)
+
+
+def test_numpys_numbers_are_numbers_of_games() -> None:
+    number: Any = np.int64
+    assert RollerVecEnv("flat", number(2), seed=number(3)).num_envs == 2
+
+
+@pytest.mark.parametrize(("mode", "action", "says"), WRONG_ACTIONS)
+def test_an_action_outside_the_space_is_refused(mode: str, action: Any, says: str) -> None:
+    games = RollerVecEnv("flat", 2, action=mode)
+    games.reset()
+    with pytest.raises(ValueError, match=says):
+        games.step(np.array([action, action]))
