@@ -182,9 +182,9 @@ def build_end_gui(frame: GameFrame, following: Choice | None) -> Wish | None:
 
 def end_rows(result: Result) -> Rows:
     """Return what the end panel tells of a game: names and values."""
-    there_were = COIN_ON_PANELS * result.coins_in_level
+    points, all_points = COIN_ON_PANELS * result.coins, COIN_ON_PANELS * result.coins_in_level
     return (
-        ("Points", f"{COIN_ON_PANELS * result.coins} of {there_were}"),
+        ("Points", f"{points} of {all_points}"),
         ("Coins", f"{result.coins} of {result.coins_in_level}"),
         ("Score", f"{result.score_percent:.0f} %"),
         ("Time", f"{result.time_s:.1f} s"),

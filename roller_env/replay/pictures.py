@@ -126,7 +126,7 @@ def _pictures(
 def _captions(replay: Replay) -> tuple[str, str]:
     level, result = replay.level, replay.result
     played = f"{replay.player or 'unknown player'}, {result.time_s:.1f} s to: {result.outcome}"
-    there_were = len(coin_positions(level)[0])
-    coins = f"{result.coins} of {there_were} coins ({result.score_percent:.0f} %)"
+    in_level = len(coin_positions(level)[0])
+    coins = f"{result.coins} of {in_level} coins ({result.score_percent:.0f} %)"
     preset = replay.options.physics.name
     return level.title or level.name, f"{played}, {coins}, level {level.name}, physics {preset}"
