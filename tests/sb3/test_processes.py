@@ -18,12 +18,12 @@ from roller_env.envs.single import RollerEnv
 def test_forked_processes_play_the_games_of_the_vector_that_was_stepped_before() -> None:
     actions = np.array([1, 3])
     ours = RollerVecEnv("flat", 2, seed=4, num_threads=2)
-    expected = [ours.reset()]
-    expected += [ours.step(actions)[0].copy() for _ in range(3)]
+    expected = [np.array(ours.reset())]
+    expected += [np.array(ours.step(actions)[0]) for _ in range(3)]
     theirs = SubprocVecEnv([lambda: RollerEnv(level="flat")] * 2, start_method="fork")
     theirs.seed(4)
-    found = [theirs.reset()]
-    found += [theirs.step(actions)[0] for _ in range(3)]
+    found = [np.array(theirs.reset())]
+    found += [np.array(theirs.step(actions)[0]) for _ in range(3)]
     theirs.close()
     ours.close()
     assert np.array_equal(found, expected)
