@@ -26,14 +26,20 @@ def vector_info(simulation: Simulation, rows: Int64 | None = None) -> dict[str, 
 
     Each key has an array of (N,), 0 in other rows, and ``_key`` says in which rows it is told.
     """
-    every: Int64 | slice = slice(None) if rows is None else rows
     info: dict[str, Any] = {}
     for name, values in _told(simulation, rows).items():
-        info[name] = np.zeros(simulation.num_envs, dtype=values.dtype)
-        info[name][every] = values
-        info[f"_{name}"] = np.zeros(simulation.num_envs, dtype=bool)
-        info[f"_{name}"][every] = True
+        info[name] = _among(simulation.num_envs, rows, values)
+        info[f"_{name}"] = _among(simulation.num_envs, rows, np.ones(len(values), dtype=bool))
     return info
+
+
+def _among(num_envs: int, rows: Int64 | None, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return values of ``rows`` as those of all rows, 0 in the others."""
+    if rows is None:
+        return values
+    every = np.zeros(num_envs, dtype=values.dtype)
+    every[rows] = values
+    return every
 
 
 def rows_of(told: Mapping[str, Any]) -> list[dict[str, Any]]:

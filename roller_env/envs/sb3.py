@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvS
 
 from roller_env.checks import is_whole, nearest
 from roller_env.envs.arguments import seed_of
-from roller_env.envs.infos import rows_of
+from roller_env.envs.infos import rows_of, vector_info
 from roller_env.envs.spaces import keys_to_action, row_of
 from roller_env.envs.vector import RollerVectorEnv
 from roller_env.level import Level
@@ -112,14 +112,14 @@ class RollerVecEnv(VecEnv):
         first = self._options[0]
         # set_options makes one mapping that all rows share, unless each is given its own.
         if all(options is first or not (options or first) for options in self._options):
-            observation, info = self.vector.reset(seed=self._seeds, options=first)
+            observation, _ = self.vector.reset(seed=self._seeds, options=first)
         else:
             for row in range(self.num_envs):
-                observation, info = self._reset_vector(row, self._seeds[row], self._options[row])
+                observation, _ = self._reset_vector(row, self._seeds[row], self._options[row])
         # The base class resets its seeds and options after use, as its other children do.
         self._reset_seeds()
         self._reset_options()
-        self.reset_infos = rows_of(info)
+        self.reset_infos = rows_of(vector_info(self.simulation))
         self._returns[:] = 0.0
         self._lengths[:] = 0
         self._began = time.time()

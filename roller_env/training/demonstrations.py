@@ -15,7 +15,6 @@ from tqdm import tqdm
 from roller_env.config import EnvConfig, make_config
 from roller_env.envs.spaces import action_space, observation_space
 from roller_env.game.actions import ActionMode, forces
-from roller_env.game.rewards import RewardWeights
 from roller_env.level import load_level
 from roller_env.problems import shown
 from roller_env.replay import Replay, ReplayError, load_replay
@@ -175,16 +174,17 @@ def _from_minari(data_set: Any, wanted: EnvConfig) -> list[Demonstration]:
             f"{_brief(needed)}"
         )
     spec, level = data_set.env_spec, load_level(wanted.level)
-    options: dict[str, Any] = {} if spec is None else spec.kwargs
-    if "level" in options and load_level(options["level"]) != level:
-        raise DemonstrationError(
-            f"{data_set.id}: found level {options['level']!r}, not {level.name!r}"
-        )
-    # A data set that names its environment was made with the default weights.
-    is_rewarded_so = wanted.reward_weights == RewardWeights() and (
-        (options.get("reward"), options.get("discount")) == (wanted.reward, wanted.discount)
+    # One that does not name its environment is taken for a recording of the training's, but for
+    # what it rewards.
+    recorded = wanted if spec is None else make_config(**spec.kwargs)
+    played = load_level(recorded.level)
+    if played != level:
+        raise DemonstrationError(f"{data_set.id}: found level {played.name!r}, not {level.name!r}")
+    is_rewarded_so = spec is not None and all(
+        getattr(recorded, name) == getattr(wanted, name)
+        for name in ("reward", "reward_weights", "discount")
     )
-    ratio = wanted.control_dt_s / options.get("control_dt_s", wanted.control_dt_s)
+    ratio = wanted.control_dt_s / recorded.control_dt_s
     mode = _action_mode(data_set, wanted)
     return [
         _thinned(

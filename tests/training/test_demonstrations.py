@@ -14,6 +14,7 @@ import pytest
 from roller_env.config import make_config
 from roller_env.envs.single import RollerEnv
 from roller_env.game.actions import forces
+from roller_env.game.rewards import RewardWeights
 from roller_env.level import load_level
 from roller_env.replay import record_episode, save_replay
 from roller_env.replay.datasets import to_minari
@@ -108,6 +109,20 @@ def test_a_minari_data_set_is_read_by_name_and_by_path(
         assert np.array_equal(one.observations, other.observations)  # type: ignore[arg-type]
         # Points are what the data set's environment gave; what shaping would have is not known.
         assert (one.rewards is not None) == (reward == "points")
+
+
+@pytest.mark.parametrize("coin", [1.0, 2.0])
+def test_rewards_of_a_minari_data_set_count_where_the_training_has_the_same_weights(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, coin: float
+) -> None:
+    pytest.importorskip("minari", reason="the extra 'demos' is not installed")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    weights = RewardWeights(coin=2.0)
+    played = [wandered("flat", seed=seed, reward_weights=weights) for seed in range(2)]
+    to_minari(played, "roller/flat/test-v0")
+    config = training(reward_weights={"coin": coin})
+    for one in load_demonstrations("roller/flat/test-v0", config):
+        assert (one.rewards is not None) == (coin == 2.0)
 
 
 def test_a_data_set_of_keys_held_for_shorter_steps_becomes_the_trainings_actions(
