@@ -30,7 +30,8 @@ from roller_env.level import LevelError
 from roller_env.play.autopilot import load_autopilot
 from roller_env.replay import ReplayError, load_replay
 from roller_env.training.checkpoint import CheckpointError, load_checkpoint
-from roller_env.training.config import ConfigError, TrainingConfig, load_config
+from roller_env.training.config import TrainingConfig, load_config
+from roller_env.training.config_source import ConfigError
 from roller_env.training.demonstrations import DemonstrationError, load_demonstrations
 from roller_env.training.files import RunError, RunFiles
 from roller_env.training.policy import load_policy, save_policy
