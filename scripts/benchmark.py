@@ -23,7 +23,8 @@ from roller_env.lab.benchmark.race import Pace
 from roller_env.lab.provenance import header, provenance
 from roller_env.lab.tables import write_rows
 from roller_env.level.errors import LevelError
-from roller_env.training.config import ConfigError, load_config
+from roller_env.training.config import load_config
+from roller_env.training.config_source import ConfigError
 
 _PACKAGES = ("mujoco", "numpy", "gymnasium", "stable-baselines3", "torch")
 _QUICK = Pace(rounds=2, round_s=0.05, warm_up_s=0.5)

@@ -4,7 +4,8 @@ The one part of the package, beside `roller_env.envs.sb3`, that imports Stable-B
 it needs the ``train`` extra.
 """
 
-from roller_env.training.config import ConfigError, TrainingConfig, load_config
+from roller_env.training.config import TrainingConfig, load_config
+from roller_env.training.config_source import ConfigError
 from roller_env.training.evaluate import Evaluation, evaluate
 from roller_env.training.policy import Policy, load_policy
 from roller_env.training.run import TrainingRun, train

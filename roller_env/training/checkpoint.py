@@ -154,10 +154,11 @@ def load_checkpoint(file: Path) -> Checkpoint:
         raise _damaged(file, "its content does not match its hash")
     try:
         facts, arrays = _members(body)
+        progress = facts["progress"]
         return Checkpoint(
             file=file,
             config=TrainingConfig.model_validate(facts["config"]),
-            progress=Progress(**facts["progress"]),
+            progress=Progress(int(progress["steps"]), float(progress["wall_s"])),
             state=_nested({**facts["state"], **arrays}),
         )
     except (zipfile.BadZipFile, SafetensorError, ValidationError) as error:
@@ -225,7 +226,7 @@ def _set_state(model: PPO, state: Tree) -> None:
     _check_moments(moments, [p for group in optimizer.param_groups for p in group["params"]])
     optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
     learner = state["learner"]
-    model.num_timesteps, model._n_updates = learner["steps"], learner["updates"]
+    model.num_timesteps, model._n_updates = int(learner["steps"]), int(learner["updates"])
     model._last_obs = learner["observations"]
     model._last_episode_starts = learner["episode_starts"]
     for name, entry in statistics(normaliser).items():

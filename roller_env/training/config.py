@@ -25,14 +25,15 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from roller_env.config import MAX_ENVS, make_config
 from roller_env.envs.spaces import action_space, observation_space
 from roller_env.game.rewards import RewardWeights
-from roller_env.problems import FieldPath, Problem, ProblemsError, listed, quoted
-from roller_env.training.files import RunError, read_whole
-from roller_env.yaml_tree import MAX_BYTES, MAX_DEPTH, Node, YamlError, read_tree, read_value
+from roller_env.problems import Problem, listed
+from roller_env.training.config_source import ConfigError, ConfigSource
 
 MAX_STEPS: Final = 10**12
-_LONG: Final = 64
 MAX_ROLLOUT: Final = 10**8
 """Samples of a rollout: they are in memory, some hundred bytes each."""
+
+_LONG: Final = 64
+"""Characters of a value that a message shows."""
 
 
 def _whole(value: object) -> object:
@@ -52,10 +53,6 @@ Fraction = Annotated[float, Field(gt=0.0, le=1.0)]
 PositiveFloat = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
 NonNegativeFloat = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 Name = Annotated[str, Field(min_length=1, max_length=1_000), AfterValidator(_printable)]
-
-
-class ConfigError(ProblemsError):
-    """A training configuration that cannot be used; all its faults, each with its place."""
 
 
 class _Frozen(BaseModel):
@@ -275,83 +272,12 @@ def load_config(file: str | os.PathLike[str], overrides: Sequence[str] = ()) -> 
     Raises:
         ConfigError: unreadable, unknown field, or a value that is not allowed; says where.
     """
-    path = Path(file)
-    try:
-        root = read_tree(_content(path), str(path))
-        source = _Source(root, str(path))
-        for override in overrides:
-            source.override(override)
-    except YamlError as error:
-        raise ConfigError(error.problems) from None
+    source = ConfigSource(Path(file), overrides)
     try:
         return TrainingConfig.model_validate(source.content)
     except ValidationError as error:
         problems = [_problem(details, source) for details in error.errors(include_url=False)]
         raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)) from None
-
-
-class _Source:
-    """What a configuration is read from: a file, and what is said instead on the command line.
-
-    Attributes:
-        content: plain data, mappings and lists and scalars.
-    """
-
-    def __init__(self, root: Node, filename: str) -> None:
-        content = root.plain()
-        assert isinstance(content, dict)
-        self.content: dict[str, Any] = content
-        self._root, self._filename = root, filename
-        self._overrides: dict[FieldPath, str] = {}
-
-    def override(self, override: str) -> None:
-        """Put a value where ``field=value`` says.
-
-        Raises:
-            ConfigError: it says no such thing, or the field is inside of what has no fields.
-            YamlError: the value is no YAML.
-        """
-        name, equals, value = override.partition("=")
-        place = f"--set {quoted(override)}"
-        *parents, leaf = name.split(".")
-        if not equals or not all((*parents, leaf)) or len(parents) > MAX_DEPTH:
-            message = "expected field=value, such as ppo.gamma=0.995"
-            raise ConfigError([Problem((), message, place)])
-        inner = self.content
-        for parent in parents:
-            inner = inner.setdefault(parent, {})
-            if not isinstance(inner, dict):
-                message = f"{quoted(parent)} has no fields of its own"
-                raise ConfigError([Problem((), message, place)])
-        inner[leaf] = read_value(value, place).plain()
-        self._overrides[*parents, leaf] = place
-
-    def where(self, path: FieldPath, *, of_key: bool) -> dict[str, Any]:
-        """Return filename, line and column of a field for a `Problem`."""
-        for length in range(len(path), 0, -1):
-            if place := self._overrides.get(path[:length]):
-                return {"filename": place}
-        line, column = self._root.position(path, of_key=of_key)
-        return {"filename": self._filename, "line": line, "column": column}
-
-
-def _content(file: Path) -> str:
-    """Return a file's text.
-
-    Raises:
-        ConfigError: there is none, or it is no text.
-    """
-    if not file.exists():
-        known = tuple(other.name for other in file.parent.glob("*.yaml"))
-        message = "there is no such file"
-        raise ConfigError([Problem((), message, str(file), written=file.name, known=known)])
-    try:
-        return read_whole(file, MAX_BYTES).decode("utf-8-sig")
-    except RunError as error:
-        raise ConfigError([Problem((), str(error))]) from None
-    except UnicodeDecodeError as error:
-        message = f"found the byte 0x{error.object[error.start]:02x}, which is not UTF-8"
-        raise ConfigError([Problem((), message, str(file))]) from None
 
 
 def _with_weights(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -369,7 +295,7 @@ def _with_weights(options: Mapping[str, Any]) -> dict[str, Any]:
     return {**options, "reward_weights": RewardWeights(**weights)}
 
 
-def _problem(details: ErrorDetails, source: _Source) -> Problem:
+def _problem(details: ErrorDetails, source: ConfigSource) -> Problem:
     path, message, found = details["loc"], details["msg"], details["input"]
     if details["type"] == "extra_forbidden":
         models: dict[tuple[Any, ...], type[BaseModel]] = {

@@ -120,9 +120,9 @@ def read_whole(file: Path, max_bytes: int) -> bytes:
     Raises:
         RunError: there is no such file, or it cannot be read, or is larger than allowed.
     """
-    if not file.is_file():
-        raise RunError(f"{shown(file)}: {'not a file' if file.exists() else 'there is none'}")
     try:
+        if not file.is_file():
+            raise RunError(f"{shown(file)}: {'not a file' if file.exists() else 'there is none'}")
         with file.open("rb") as stream:
             content = stream.read(max_bytes + 1)
     except OSError as error:

@@ -9,11 +9,16 @@ from __future__ import annotations
 import csv
 import io
 import math
+import os
+import socket
+import time
 from pathlib import Path
 from typing import Any, Final
 
-from stable_baselines3.common.logger import KVWriter, TensorBoardOutputFormat
-from torch.utils.tensorboard.writer import SummaryWriter
+from stable_baselines3.common.logger import KVWriter
+from tensorboard.compat.proto.event_pb2 import Event, SessionLog
+from tensorboard.summary.writer.record_writer import RecordWriter
+from torch.utils.tensorboard.summary import scalar
 
 from roller_env.problems import shown
 from roller_env.training.files import RunError, read_whole, write_atomically
@@ -69,8 +74,12 @@ class ContinuingCSV(KVWriter):
         return csv.DictWriter(self._stream, self._columns, lineterminator="\n")
 
 
-class ContinuingTensorBoard(TensorBoardOutputFormat):
-    """Event files in one directory, which TensorBoard shows as one curve without repeats."""
+class ContinuingTensorBoard(KVWriter):
+    """Event files in one directory, which TensorBoard shows as one curve without repeats.
+
+    Written at once and in the caller's thread: a full disk is then an error where it can be told,
+    and not one in a thread that nobody hears of.
+    """
 
     def __init__(self, directory: Path, steps: int) -> None:
         """Start an event file.
@@ -80,8 +89,14 @@ class ContinuingTensorBoard(TensorBoardOutputFormat):
             steps: the training's step count now; TensorBoard drops what older files say of
                 later steps.
         """
-        self.writer = SummaryWriter(log_dir=str(directory), purge_step=steps + 1)
-        self._is_closed = False
+        directory.mkdir(parents=True, exist_ok=True)
+        # TensorBoard reads files in the order of their names, and these by their first word.
+        moment = f"{int(time.time()):010d}.{socket.gethostname()}.{os.getpid()}.{time.time_ns()}"
+        self._stream = (directory / f"events.out.tfevents.{moment}").open("xb")
+        self._records = RecordWriter(self._stream)
+        start = SessionLog(status=SessionLog.START)
+        self._append(Event(step=steps + 1, file_version="brain.Event:2"))
+        self._append(Event(step=steps + 1, session_log=start))
 
     def write(
         self,
@@ -90,8 +105,19 @@ class ContinuingTensorBoard(TensorBoardOutputFormat):
         step: int = 0,
     ) -> None:
         """Append one point a curve; none where there was nothing to measure (NaN)."""
-        known = {key: value for key, value in key_values.items() if not _is_nan(value)}
-        super().write(known, {key: key_excluded[key] for key in known}, step)
+        for key, value in sorted(key_values.items()):
+            if "tensorboard" not in key_excluded[key] and not _is_nan(value):
+                summary = scalar(key, value)  # type: ignore[no-untyped-call]
+                self._append(Event(step=step, summary=summary))
+        self._stream.flush()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._stream.close()
+
+    def _append(self, event: Any) -> None:
+        event.wall_time = time.time()
+        self._records.write(event.SerializeToString())
 
 
 def read_progress(file: Path) -> list[dict[str, str]]:

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from roller_env.game.rewards import RewardWeights
 from roller_env.level import shipped_levels
-from roller_env.training.config import ConfigError, TrainingConfig, load_config
+from roller_env.training.config import TrainingConfig, load_config
+from roller_env.training.config_source import ConfigError
 from tests.training.small import small_config
 
 BOMB = "abcdefghijklmnopqrstuvwxyz"
@@ -158,6 +159,22 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
     written(tmp_path, "level: flat")
     with pytest.raises(ConfigError, match=r"did you mean 'training\.yaml'"):
         load_config(tmp_path / "trainign.yaml")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("x" * 300, "cannot be read: File name too long"),
+        ("latin.yaml", "found the byte 0xe4, which is not UTF-8"),
+        ("directory.yaml", "not a file"),
+        ("a\0b", "there is no such file"),
+    ],
+)
+def test_what_cannot_be_read_is_told(tmp_path: Path, name: str, message: str) -> None:
+    (tmp_path / "latin.yaml").write_bytes("level: flät".encode("latin1"))
+    (tmp_path / "directory.yaml").mkdir()
+    with pytest.raises(ConfigError, match=message):
+        load_config(tmp_path / name)
 
 
 def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:

@@ -20,7 +20,8 @@ from roller_env.replay import record_episode, save_replay
 from roller_env.replay.datasets import to_minari
 from roller_env.replay.scripted import PLAYER, ScriptedPlayer, meant
 from roller_env.simulation import Simulation
-from roller_env.training.config import ConfigError, TrainingConfig, load_config
+from roller_env.training.config import TrainingConfig, load_config
+from roller_env.training.config_source import ConfigError
 from roller_env.training.demonstrations import DemonstrationError, load_demonstrations
 from tests.replay.recording import wandered
 from tests.training.small import small_config

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from roller_env.envs.sb3 import RollerVecEnv
-from roller_env.training.config import ConfigError, load_config
+from roller_env.training.config import load_config
+from roller_env.training.config_source import ConfigError
 from roller_env.training.files import RunFiles
 from roller_env.training.policy import load_policy, save_policy
 from roller_env.training.ppo import learn

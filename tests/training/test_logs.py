@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import threading
 from pathlib import Path
 
+import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from roller_env.training.logs import STEPS, ContinuingCSV, ContinuingTensorBoard, read_progress
+from tests.training.disk import largest_file
 
 
 def log(writer: ContinuingCSV, *steps: int) -> None:
@@ -73,3 +76,18 @@ def test_tensorboard_shows_every_step_once_and_nothing_where_nothing_was_measure
     events.Reload()
     assert [event.step for event in events.Scalars("speed")] == [10, 20, 30, 40]
     assert [event.step for event in events.Scalars("success")] == [20, 30, 40]
+
+
+def test_a_full_disk_is_an_error_where_a_row_is_written(tmp_path: Path) -> None:
+    before = threading.active_count()
+    board = ContinuingTensorBoard(tmp_path, 0)
+    table = ContinuingCSV(tmp_path / "progress.csv", 0)
+    log(table, 10)
+    with largest_file(40):
+        with pytest.raises(OSError, match="File too large"):
+            board.write({"speed": 1.0}, {"speed": ("",)}, 20)
+        with pytest.raises(OSError, match="File too large"):
+            log(table, *range(20, 100, 10))
+    assert threading.active_count() == before
+    board.close()
+    table.close()

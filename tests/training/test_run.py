@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import runpy
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +25,7 @@ from roller_env.training.logs import STEPS, read_progress
 from roller_env.training.policy import TrainedPolicy, load_policy
 from roller_env.training.ppo import learn, make_environments, new_model
 from roller_env.training.run import evaluate_policy, train
+from tests.training.disk import largest_file
 from tests.training.small import UPDATES, small_config
 
 ROOT = Path(__file__).parents[2]
@@ -157,17 +156,6 @@ def test_a_run_is_not_overwritten_by_another(tmp_path: Path) -> None:
         train(small_config(), tmp_path)
     with pytest.raises(RunError, match=r"another configuration[^\n]*\n  seed: 3, 4"):
         train(small_config(seed=4), tmp_path, resume=True)
-
-
-@contextmanager
-def largest_file(bytes_: int) -> Iterator[None]:
-    """Let no file grow larger, as if the disk were full then."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_a_training_whose_disk_was_full_says_what_is_kept_and_goes_on_with_the_same_bits(
