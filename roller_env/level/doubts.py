@@ -37,16 +37,15 @@ def level_warnings(level: Level, unit: Unit = "metre") -> list[Problem]:
 def _start(level: Level, everything: Sequence[Solid], in_unit: InUnit) -> Iterator[Problem]:
     at, jitter = np.array([level.start.at]), level.start.jitter
     radius, lowest = level.ball.radius, level.kill_height
-    _, (firm,) = held_up(everything, at, radius, lowest)
-    if not firm:
+    if not held_up(everything, at, radius, lowest).all():
         limit = in_unit.length(lowest)
-        message = f"nothing is under the ball down to the kill height, {limit}, so it falls at once"
+        message = f"nothing is under the middle of the ball down to the kill height, {limit}"
         yield Problem(("start", "at"), message)
     elif any(jitter):
         places = starts(level, _STARTS)
-        _, firm_there = held_up(everything, places, radius, lowest)
-        if not firm_there.all():
-            where = in_unit.point(places[np.flatnonzero(~firm_there)[0]].tolist())
+        past = ~held_up(everything, places, radius, lowest)
+        if past.any():
+            where = in_unit.point(places[past][0].tolist())
             message = f"takes the ball past an edge, as at {where}; wanted ground under all of it"
             yield Problem(("start", "jitter"), message)
 

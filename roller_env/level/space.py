@@ -123,20 +123,16 @@ def burying(
     return around
 
 
-def held_up(
-    blocks: Sequence[Solid], places: Float64, radius: float, lowest: float
-) -> tuple[Bool, Bool]:
-    """Say over which places (n, 3) a ball has solids under it, and where they can hold it up.
+def held_up(blocks: Sequence[Solid], places: Float64, radius: float, lowest: float) -> Bool:
+    """Say at which places, (n,), something is under a ball that can hold it up.
+
+    It is under the ball's middle, or on two opposite sides of it, as rails are.
 
     Args:
         blocks: the solids.
-        places: ball centres, metres.
+        places: (n, 3) ball centres, metres.
         radius: the ball's, metres.
         lowest: height down to which solids count.
-
-    Returns:
-        some: (n,) whether there is anything to fall on.
-        firm: (n,) whether that is under its middle, or on two opposite sides of it, as with rails.
     """
     angles = 2.0 * np.pi * np.arange(_RING) / _RING
     ring = _RING_SHARE * radius * np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
@@ -149,7 +145,8 @@ def held_up(
     for number in near.tolist():
         hits |= _stands_over(blocks[number], feet, lowest)
     opposite = hits[:, 1 : 1 + _RING // 2] & hits[:, 1 + _RING // 2 :]
-    return hits.any(axis=1), hits[:, 0] | opposite.any(axis=1)
+    firm: Bool = hits[:, 0] | opposite.any(axis=1)
+    return firm
 
 
 def _stands_over(solid: Solid, feet: Float64, lowest: float) -> Bool:
@@ -162,7 +159,7 @@ def _stands_over(solid: Solid, feet: Float64, lowest: float) -> Bool:
         if abs(down[axis]) < 1e-12:
             leave = np.where(np.abs(local[..., axis]) <= half[axis], leave, -1.0)
             continue
-        ends = (np.array([-half[axis], half[axis]]) - local[..., axis, None]) / down[axis]
+        ends = (np.array([-half[axis], half[axis]]) - local[..., [axis]]) / down[axis]
         enter = np.maximum(enter, ends.min(axis=-1))
         leave = np.minimum(leave, ends.max(axis=-1))
     over: Bool = enter <= leave

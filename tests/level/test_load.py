@@ -88,11 +88,11 @@ def test_a_level_object_is_checked_and_returned() -> None:
 
 def test_a_bad_level_object_is_refused_by_its_field_without_a_line() -> None:
     with pytest.raises(LevelError) as caught:
-        load_level(small_level(coins=[{"at": (1.0, 0.0, -0.5)}]))
+        load_level(small_level(coins=[{"at": (1.0, 0.0, -90.0)}]))
     (problem,) = caught.value.problems
     assert problem.path == ("coins", 0)
     assert problem.line is None
-    assert str(problem).startswith("coins[0]: the coin at [1, 0, -0.5] is inside boxes[0]")
+    assert str(problem).startswith("coins[0]: the coin at [1, 0, -90] is not above the kill height")
 
 
 def test_every_shipped_level_loads_by_name_and_by_path() -> None:
@@ -466,10 +466,16 @@ BROKEN_MEANING = {
             "(did you mean 'door'?)"
         ],
     ),
-    "coin in a solid": (
-        SMALL + "coins:\n  - at: [9, 0, 16]\n  - line: {start: [9, 0, 16], end: [9, 0, -4], "
-        "count: 6}\n",
-        ["9:5: coins[1]: the coin at [9, 0, -4] is inside boxes[0]; move it into free space"],
+    "start in the finish": (
+        SMALL.replace("[500, 0, 16]", "[20, 0, 16]"),
+        [
+            "3:13: start.at: the ball, of radius 16 quants, would start in the finish; wanted "
+            "outside, at least its radius away"
+        ],
+    ),
+    "finish in a solid": (
+        SMALL.replace("[500, 0, 16], size: [32, 32, 32]", "[500, 0, -8], size: [8, 8, 8]"),
+        ["4:14: finish.at: the finish is wholly inside boxes[0], where no ball can reach it"],
     ),
     "several, in the order of the file": (
         SMALL.replace("16]}", "4]}").replace("[500, 0, 16]", "[500, 0, -1129]"),
