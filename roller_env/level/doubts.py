@@ -12,7 +12,7 @@ from roller_env.level.space import burying, held_up, inside, is_static, solids_a
 from roller_env.level.words import InUnit, Unit, coin_groups
 from roller_env.problems import Problem
 
-_STARTS = 9
+_STARTS = 5
 """Places tried along each axis of the jitter; its corners and middle are among them."""
 
 

@@ -97,13 +97,13 @@ def test_ground_that_is_turned_or_tilted_is_ground(turn: dict[str, float]) -> No
 def test_whatever_is_solid_is_ground(kind: str) -> None:
     tube = {"start": (-9, 0, -2), "end": (9, 0, -2), "inner_radius": 1.0}
     at = {"at": (0.0, 0.0, -1.0), "size": (2.0, 2.0, 1.0)}
-    pieces: dict[str, Any] = {
+    kinds: dict[str, dict[str, Any]] = {
         "plate": {"plates": [PLATE | at | {"opens": ["gate"], "sinks_to": -2}], "gates": [GATE]},
         "gate": {"gates": [GATE | at | {"lowers_to": -9}], "plates": LINKED["plates"]},
         "pad": {"lift_pads": [at]},
         "tube": {"tubes": [tube]},
-    }[kind]
-    assert doubts(boxes=[], start=start_at(0, 0, RADIUS, 0.3, 0.3), **pieces) == []
+    }
+    assert doubts(boxes=[], start=start_at(0, 0, RADIUS, 0.3, 0.3), **kinds[kind]) == []
 
 
 def test_a_plate_that_is_wholly_inside_a_solid_is_in_doubt() -> None:
