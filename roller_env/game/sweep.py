@@ -55,7 +55,6 @@ class Events:
         coins: (N, K) coins collected.
         points: (N,) how many.
         plates: (N, P) plates struck.
-        pads: (N, A) lift pads fired.
         triggers: (N, T) camera triggers fired.
         finished: (N,) the finish was reached.
         fallen: (N,) the ball fell below the kill height.
@@ -67,7 +66,6 @@ class Events:
     coins: Bool
     points: Int64
     plates: Bool
-    pads: Bool
     triggers: Bool
     finished: Bool
     fallen: Bool
@@ -123,7 +121,6 @@ def find_events(state: GameState, table: LevelTable, motion: Motion) -> Events:
         coins=coins,
         points=points,
         plates=met[:, table.slices[Kind.PLATE]],
-        pads=met[:, table.slices[Kind.LIFT_PAD]],
         triggers=met[:, table.slices[Kind.TRIGGER]],
         finished=finished,
         fallen=fallen,

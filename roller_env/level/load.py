@@ -8,6 +8,7 @@ not be read would make every plate that names it look wrong.
 
 from __future__ import annotations
 
+import math
 import os
 import warnings
 from collections.abc import Iterable
@@ -187,7 +188,7 @@ def _placed(problem: Problem, root: Node, filename: str) -> Problem:
 
 
 def _in_file_order(problems: Iterable[Problem]) -> list[Problem]:
-    return sorted(problems, key=lambda problem: (problem.line or 0, problem.column or 0))
+    return sorted(problems, key=lambda problem: (problem.line or math.inf, problem.column or 0))
 
 
 def _refuse(problems: Iterable[Problem]) -> None:

@@ -183,7 +183,7 @@ def test_of_thousands_of_wrong_fields_the_first_are_told() -> None:
     with pytest.raises(LevelError) as caught:
         parse_level(SMALL + "plates:\n" + "- 0\n" * 5_000)
     assert len(caught.value.problems) == MAX_PROBLEMS + 1
-    assert "4000 more fields are wrong" in str(caught.value)
+    assert caught.value.problems[-1].message == "4000 more fields are wrong"
 
 
 def test_a_file_may_be_one_mebibyte_and_no_more(tmp_path: Path) -> None:
