@@ -8,7 +8,9 @@ not be read would make every plate that names it look wrong.
 
 from __future__ import annotations
 
+import math
 import os
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -18,10 +20,12 @@ from pydantic import ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema
 
-from roller_env.level.check import Unit, check_level
-from roller_env.level.errors import LevelError
+from roller_env.level.check import check_level
+from roller_env.level.doubts import level_warnings
+from roller_env.level.errors import LevelError, LevelWarning
 from roller_env.level.messages import explain
 from roller_env.level.schema import METRES_PER_UNIT, SCALE_KEY, Level
+from roller_env.level.words import Unit
 from roller_env.problems import Problem, listed, quoted
 from roller_env.regular_files import read_regular_file
 from roller_env.yaml_tree import MAX_BYTES, Node, YamlError, plain_tree, read_tree
@@ -30,7 +34,7 @@ SUFFIXES: Final = (".yaml", ".yml")
 
 
 def load_level(source: str | os.PathLike[str] | Level | Mapping[str, Any]) -> Level:
-    """Load and check a level.
+    """Load and check a level; what is strange about it is a `LevelWarning`.
 
     Args:
         source: the name of a shipped level ("classic"), the path of a .yaml file, the fields of a
@@ -47,15 +51,16 @@ def load_level(source: str | os.PathLike[str] | Level | Mapping[str, Any]) -> Le
     """
     if isinstance(source, Level):
         _refuse(check_level(source))
+        _warn(level_warnings(source), stacklevel=3)
         return source
     if isinstance(source, Mapping):
         try:
-            return _level(_tree(lambda: plain_tree(source)), "", "")
+            return _level(_tree(lambda: plain_tree(source)), "", "", stacklevel=4)
         except LevelError as error:
             raise LevelError(map(_without_a_place, error.problems)) from None
     is_name = isinstance(source, str) and not is_path(source)
     path = _shipped_path(str(source)) if is_name else Path(source)
-    return _parse_bytes(_read(path), str(path))
+    return _parse(_decoded(_read(path), str(path)), str(path), stacklevel=4)
 
 
 def is_path(source: str) -> bool:
@@ -65,7 +70,7 @@ def is_path(source: str) -> bool:
 
 
 def parse_level(text: str, filename: str = "<text>") -> Level:
-    """Load and check a level from the text of a level file.
+    """Load and check a level from the text of a level file, as `load_level` does a file.
 
     Args:
         text: YAML; the format is described in docs/levels.md.
@@ -77,7 +82,11 @@ def parse_level(text: str, filename: str = "<text>") -> Level:
     Raises:
         LevelError: the level has problems; all of them are in ``problems``.
     """
-    return _level(_tree(lambda: read_tree(text, filename)), text, filename)
+    return _parse(text, filename, stacklevel=4)
+
+
+def _parse(text: str, filename: str, stacklevel: int) -> Level:
+    return _level(_tree(lambda: read_tree(text, filename)), text, filename, stacklevel + 1)
 
 
 def _tree(read: Callable[[], Node]) -> Node:
@@ -88,7 +97,7 @@ def _tree(read: Callable[[], Node]) -> Node:
         raise LevelError(error.problems) from None
 
 
-def _level(root: Node, text: str, filename: str) -> Level:
+def _level(root: Node, text: str, filename: str, stacklevel: int) -> Level:
     """Return the level that a tree says, if it is right in shape and in meaning."""
     unit = _unit(root)
     try:
@@ -96,6 +105,7 @@ def _level(root: Node, text: str, filename: str) -> Level:
     except ValidationError as error:
         raise LevelError(_in_file_order(explain(error, root, text, filename))) from None
     _refuse(_placed(problem, root, filename) for problem in check_level(level, unit))
+    _warn((_placed(doubt, root, filename) for doubt in level_warnings(level, unit)), stacklevel)
     return level
 
 
@@ -172,15 +182,14 @@ def _read(path: Path) -> bytes:
     raise LevelError([replace(problem, filename=str(path))])
 
 
-def _parse_bytes(data: bytes, filename: str) -> Level:
+def _decoded(data: bytes, filename: str) -> str:
     try:
-        text = data.decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         before = data[: error.start]
         line, column = before.count(b"\n") + 1, error.start - before.rfind(b"\n")
         message = f"found the byte 0x{data[error.start]:02x}, which is not UTF-8; save it as UTF-8"
         raise LevelError([Problem((), message, filename, line, column)]) from None
-    return parse_level(text, filename)
 
 
 def _unit(root: Node) -> Unit:
@@ -191,6 +200,8 @@ def _unit(root: Node) -> Unit:
 
 def _placed(problem: Problem, root: Node, filename: str) -> Problem:
     line, column = root.position(problem.path)
+    if line == 0:  # plain data, not a text
+        return problem
     return replace(problem, filename=filename, line=line, column=column)
 
 
@@ -199,10 +210,17 @@ def _without_a_place(problem: Problem) -> Problem:
 
 
 def _in_file_order(problems: Iterable[Problem]) -> list[Problem]:
-    return sorted(problems, key=lambda problem: (problem.line or 0, problem.column or 0))
+    return sorted(problems, key=lambda problem: (problem.line or math.inf, problem.column or 0))
 
 
 def _refuse(problems: Iterable[Problem]) -> None:
     found = _in_file_order(problems)
     if found:
         raise LevelError(found)
+
+
+def _warn(problems: Iterable[Problem], stacklevel: int) -> None:
+    """Show all problems in one warning, at the caller that many calls up."""
+    found = tuple(_in_file_order(problems))
+    if found:
+        warnings.warn(LevelWarning(found), stacklevel=stacklevel)
