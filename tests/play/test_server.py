@@ -15,6 +15,8 @@ from roller_env.play import server
 from roller_env.play.server import PlayError, open_page, open_window, run, warning_of
 from tests.play.stand import Stand
 
+pytestmark = pytest.mark.xdist_group("browser")
+
 LISTEN = "0A"
 """State of a listening socket in /proc/net/tcp."""
 
