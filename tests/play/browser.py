@@ -1,11 +1,12 @@
 """A person's eyes and hands on the page, in a browser that draws when somebody looks, and only then.
 
 Left to itself a page draws as often as it can. Without a graphics processor that is software's work,
-of all processors for all pages: beside other work a page came to four pictures a second and two
-pages to two, some of them 1.7 s apart, while Studio's server sent its states 60 times a second. A
-key that is pressed and let go between two pictures is not seen, and no number of seconds is enough
-to wait for a picture. So here a page's own clock is taken away: it draws one picture when a test
-looks, its waits end after so many pictures and messages in vain, and of two pages one stands still.
+of all processors for all pages: beside other work one page came to four pictures a second and two
+pages to two each, some of them 1.7 s apart, while the server sent what is new 60 times a second. A
+key that is pressed and let go between two pictures is not seen, what is sent piles up, and no number
+of seconds is enough to wait for a picture. So here a page's own clock is taken away: it draws one
+picture when a test looks, of two pages one stands still, and a wait is in vain after so many
+pictures and messages, not after so many seconds.
 """
 
 from __future__ import annotations
@@ -22,18 +23,20 @@ from PIL import Image
 
 Picture = npt.NDArray[np.int64]
 
-PICTURES: Final = 40
-MESSAGES: Final = 6000
-"""Drawn by the page and heard by it of the server, which sends at most 120 a second: what has not
+PICTURES: Final = 60
+MESSAGES: Final = 3000
+"""Drawn by the page, and heard by it of the server, which sends 20 to 120 a second: what has not
 come after both does not come."""
 
-ANSWERED: Final = 8
+ANSWERED: Final = 6
 """Messages after which the server has heard what the page told it."""
 
 SILENCE_S: Final = 300.0
 """After which a server that says nothing at all is taken for dead."""
 
 SIZE: Final = {"width": 420, "height": 320}
+SCALE: Final = 0.5
+"""Pixels that are drawn for each of the page's, along each side: a quarter of the work."""
 STATUS_ROWS: Final = 34
 """At the bottom, of Studio's own status bar."""
 SCENE: Final = (slice(0, -STATUS_ROWS), slice(None))
@@ -59,11 +62,10 @@ DRAWS_WHEN_TOLD: Final = """(() => {
             this.addEventListener("message", () => { heard += 1 })
         }
     }
-    window.heard = () => heard
     // What is drawn stays on the canvas until this task is over.
     window.look = () => {
         for (const callback of due.splice(0)) callback(performance.now())
-        return document.querySelector("canvas").toDataURL()
+        return [document.querySelector("canvas").toDataURL(), heard]
     }
 })()"""
 """Before anything of the page runs: its frames wait until it is looked at, and it counts what the
@@ -82,13 +84,15 @@ class Browser:
     Attributes:
         page: Playwright's.
         keyboard: its keys.
-        picture: what was seen last, (height, width, 3).
+        picture: what was seen last, (height, width, 3), as large as the page.
+        heard: messages of the server before it was drawn.
     """
 
     picture: Picture
+    heard: int
 
     def __init__(self, chromium: Any, stand: HasUrl, *, controls: bool = True) -> None:
-        self._context = chromium.new_context(viewport=SIZE)
+        self._context = chromium.new_context(viewport=SIZE, device_scale_factor=SCALE)
         self.page = self._context.new_page()
         self.page.set_default_timeout(1000.0 * SILENCE_S)
         self.page.add_init_script(DRAWS_WHEN_TOLD)
@@ -103,25 +107,30 @@ class Browser:
 
     def look(self) -> Picture:
         """Let the page draw, and return what is seen."""
-        _, png = self.page.evaluate("look()").split(",")
-        with Image.open(io.BytesIO(base64.b64decode(png))) as image:
-            self.picture = np.asarray(image.convert("RGB")).astype(np.int64)
+        url, self.heard = self.page.evaluate("look()")
+        with Image.open(io.BytesIO(base64.b64decode(url.split(",")[1]))) as image:
+            page = image.convert("RGB").resize(
+                (SIZE["width"], SIZE["height"]), Image.Resampling.NEAREST
+            )
+            self.picture = np.asarray(page).astype(np.int64)
         return self.picture
 
     def wait(self, what: str, holds: Callable[[], bool]) -> None:
         """Look until something holds."""
-        begin, drawn = self._heard(), 0
-        last_s, last = time.monotonic(), begin
-        while True:
+        self.look()
+        begin, drawn, silent_since_s = self.heard, 1, time.monotonic()
+        while not holds():
+            before = self.heard
             self.look()
-            if holds():
-                return
-            drawn, heard = drawn + 1, self._heard()
-            if heard > last:
-                last_s, last = time.monotonic(), heard
-            assert time.monotonic() < last_s + SILENCE_S, f"the server is dead: in vain until {what}"
-            assert drawn < PICTURES or heard < begin + MESSAGES, (
-                f"{drawn} pictures and {heard - begin} messages in vain until {what}"
+            drawn += 1
+            if self.heard > before:
+                silent_since_s = time.monotonic()
+            silent_s, heard = time.monotonic() - silent_since_s, self.heard - begin
+            assert silent_s < SILENCE_S, (
+                f"the server said nothing for {silent_s:.0f} s until {what}"
+            )
+            assert drawn < PICTURES or heard < MESSAGES, (
+                f"{drawn} pictures and {heard} messages in vain until {what}"
             )
 
     def settled(self) -> Picture:
@@ -143,8 +152,8 @@ class Browser:
     def tell(self) -> None:
         """Wait until the server has heard what keys and mouse did."""
         self.look()
-        enough = self._heard() + ANSWERED
-        self.wait("the server answers", lambda: self._heard() >= enough)
+        enough = self.heard + ANSWERED
+        self.wait("the server answers", lambda: self.heard >= enough)
 
     def press(self, key: str, what: str, holds: Callable[[], bool]) -> None:
         """Press a key until it has its effect, and let it go."""
@@ -163,9 +172,6 @@ class Browser:
     def close(self) -> None:
         """Leave the page."""
         self._context.close()
-
-    def _heard(self) -> int:
-        return int(self.page.evaluate("heard()"))
 
 
 def differing(first: Picture, second: Picture) -> float:

@@ -11,6 +11,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any, Final, NamedTuple
 
@@ -153,13 +154,15 @@ Make = Callable[[], tuple[Plugins, Asked]]
 
 
 def _serve(make: Make, host: str, port: int, line: Connection[Any, Any]) -> None:
-    """Serve what is made, in the other process, until ``line`` says "end"."""
+    """Serve what is made, in the other process, until ``line`` says "end" or is cut."""
     plugins, asked = make()
     ended = threading.Event()
 
     def answer() -> None:
-        while line.recv() == "status":
-            line.send(asked())
+        # A test run that is killed says nothing more, and leaves nobody behind.
+        with suppress(EOFError):
+            while line.recv() == "status":
+                line.send(asked())
         ended.set()
 
     threading.Thread(target=answer, daemon=True).start()
