@@ -10,10 +10,10 @@ control" in its bar). Here that is not heard: they can ask, and are next when th
 controls up or is gone.
 
 Panels are sent as changes, of which a page can leave none out, 60 times a second, and it takes a
-bounded number of them for each picture that it draws. A page that draws slowly - software draws it,
-beside other work - falls ever further behind: keys and ball follow at once, but after 15 s at two
-pictures a second the panels that it shows are 44 pictures old. Here the page says when the next ones
-are due: it tells its keys once for every picture. (Read and tried with MuJoCo 4.0.0.)
+bounded number of them for each picture that it draws. A page that draws slowly, as where software
+draws beside other work, falls ever further behind: after 15 s in which it drew nothing, its panels
+came right with the 44th picture. Here the page says when the next ones are due: it tells its keys
+once for every picture. (Read and tried with MuJoCo 4.0.0.)
 """
 
 from __future__ import annotations

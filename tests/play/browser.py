@@ -1,12 +1,12 @@
-"""A person's eyes and hands on the page, in a browser that draws when somebody looks, and only then.
+"""A person's eyes and hands on the page, in a browser that draws only when somebody looks.
 
-Left to itself a page draws as often as it can. Without a graphics processor that is software's work,
-of all processors for all pages: beside other work one page came to four pictures a second and two
-pages to two each, some of them 1.7 s apart, while the server sent what is new 60 times a second. A
-key that is pressed and let go between two pictures is not seen, what is sent piles up, and no number
-of seconds is enough to wait for a picture. So here a page's own clock is taken away: it draws one
-picture when a test looks, of two pages one stands still, and a wait is in vain after so many
-pictures and messages, not after so many seconds.
+Left to itself a page draws as often as it can. Without a graphics processor that is software's
+work, of all processors for all pages: beside other work one page came to four pictures a second and
+two pages to two each, some of them 1.7 s apart, while the server sent what is new 60 times a
+second. A key that is pressed and let go between two pictures is not seen, what is sent piles up,
+and no number of seconds is enough to wait for a picture. So here a page's own clock is taken away:
+it draws one picture when a test looks, of two pages one stands still, and a wait is in vain after
+so many pictures and messages, not after so many seconds.
 """
 
 from __future__ import annotations

@@ -88,7 +88,9 @@ def test_what_is_played_with_the_keys_is_recorded_and_can_be_learnt_from(
     files = [Path(file) for file in re.findall("replay: (.*)", output)]
     assert files == sorted(replays.glob("*.replay"))
     played = [load_replay(file) for file in files]
-    assert all(verify(replay).is_exact for replay in played)
+    for replay in played:
+        verdict = verify(replay)
+        assert verdict.is_exact, str(verdict)
     assert {replay.player for replay in played} == {"human"}
     pushed = [replay.force_n for replay in played[:2]]
     assert all((force[:, 0] > 0.0).any() for force in pushed)
