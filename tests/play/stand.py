@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,11 +25,8 @@ from roller_env.play.server import LOOPBACK, Plugins, open_page, run
 from roller_env.play.session import GameFrame, Phase
 from roller_env.play.sound import CoinSound
 from roller_env.replay import load_replay, shipped_replays
+from tests.patience import STALLED_S
 from tests.play.lane import Witness, game
-
-STALLED_S: Final = 600.0
-"""After which what neither ends nor goes on is taken for dead. No test waits for a clock: a machine
-with other things to do may take minutes to compile the rules and to open a page."""
 
 
 class Status(NamedTuple):

@@ -11,6 +11,7 @@ from websockets.sync.client import connect
 
 from roller_env.play.app import ANSWER_S
 from roller_env.play.session import Phase
+from tests.patience import STALLED_S
 from tests.play.browser import (
     MIDDLE,
     PANEL,
@@ -23,7 +24,7 @@ from tests.play.browser import (
     gold,
 )
 from tests.play.lane import FRAME_S
-from tests.play.stand import STALLED_S, Stand
+from tests.play.stand import Stand
 
 pytestmark = pytest.mark.xdist_group("browser")
 
@@ -76,7 +77,7 @@ def test_the_ball_is_pushed_forward_while_the_key_is_down_and_not_after(
     assert stand.status.ball_x == pytest.approx(0.0, abs=0.01)
     page.keyboard.down(key)
     page.wait("the ball moves forward", lambda: stand.status.ball_x > 0.2)
-    assert stand.status.pushed
+    page.wait("it is pushed on", lambda: stand.status.pushed)
     page.keyboard.up(key)
     page.wait("the push ends", lambda: not stand.status.pushed)
     x = stand.status.ball_x

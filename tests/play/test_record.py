@@ -19,8 +19,9 @@ from roller_env.replay import load_replay, verify
 from roller_env.training.behaviour_cloning import start_from_demonstrations
 from roller_env.training.demonstrations import load_demonstrations
 from roller_env.training.files import RunFiles
+from tests.patience import STALLED_S
 from tests.play.browser import SCENE, Browser
-from tests.play.stand import STALLED_S, free_port, is_served, wait_until_served
+from tests.play.stand import free_port, is_served, wait_until_served
 from tests.training.small import small_config
 
 pytestmark = pytest.mark.xdist_group("browser")
