@@ -6,6 +6,7 @@ second one's viewer never ends.
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 import socket
 import threading
@@ -13,7 +14,9 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
+from urllib.error import URLError
+from urllib.request import urlopen
 
 import numpy as np
 
@@ -26,7 +29,7 @@ from roller_env.play.session import GameFrame, Phase
 from roller_env.play.sound import CoinSound
 from roller_env.replay import load_replay, shipped_replays
 from tests.patience import STALLED_S
-from tests.play.lane import Witness, game
+from tests.play.lane import Witness, game, lane
 
 
 class Status(NamedTuple):
@@ -36,7 +39,7 @@ class Status(NamedTuple):
         phase: what the game is doing.
         episode: number of the episode.
         ball_x: how far forward the ball is, metres.
-        pushed: whether any key pushed it in the last step.
+        pushed: whether any key pushes it.
         coins: collected.
         success: at the finish.
         camera: the mode of the player's.
@@ -83,10 +86,21 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def is_served(host: str, port: int) -> bool:
-    """Say whether somebody listens there."""
-    with socket.socket() as probe:
-        return probe.connect_ex((host, port)) == 0
+EMPTY_SCENE_BYTES: Final = 100_000
+"""More than Studio's empty scene, and less than any level with its textures."""
+
+
+def is_served(url: str) -> bool:
+    """Say whether a level is served there.
+
+    Studio serves an empty scene first. A page that is opened before the level takes its place may
+    say "Parsing model..." for ever, and show the panels over nothing (seen with MuJoCo 4.0.0).
+    """
+    try:
+        with urlopen(f"{url}model?total_bytes", timeout=STALLED_S) as reply:
+            return int(json.load(reply)["total_bytes"]) > EMPTY_SCENE_BYTES
+    except URLError:
+        return False
 
 
 class Served:
@@ -114,7 +128,7 @@ class Served:
 
     def _is_served(self) -> bool:
         assert self._process.is_alive(), f"it ended with {self._process.exitcode}"
-        return is_served(self.host, self.port)
+        return is_served(self.url)
 
 
 class Stand(Served):
@@ -166,6 +180,13 @@ def _serve(make: Make, host: str, port: int, line: Connection[Any, Any]) -> None
     run(open_page(plugins, port=port, host=host), ended.is_set)
 
 
+LONG_LANE: Final = lane(
+    boxes=[{"at": (15.0, 0.0, -0.5), "size": (40.0, 8.0, 1.0)}],
+    finish={"at": (30.0, 0.0, 0.5), "size": (0.5, 6.0, 1.0)},
+)
+"""While a slow machine lets go of a key, the game goes on: no push is to end at the finish."""
+
+
 class TimedScreen(ScreenPlugin):
     """A screen that tells how soon keys are in what is drawn."""
 
@@ -189,7 +210,7 @@ def _game() -> tuple[Plugins, Asked]:
     """Make a game on the lane."""
     witness = Witness()
     choices = Choices((Choice("lane", "Lane"),), "lane")
-    session = game(started=False, observers=[witness])
+    session = game(LONG_LANE, started=False, observers=[witness])
     plugin = GamePlugin(lambda _: session, choices, CoinSound(muted=True), "low")
     screen = TimedScreen(choices)
 
@@ -199,7 +220,7 @@ def _game() -> tuple[Plugins, Asked]:
             phase=frame.phase,
             episode=frame.episode,
             ball_x=float(frame.after[frame.ball]),
-            pushed=bool(np.any(force)),
+            pushed=frame.phase is Phase.PLAYING and bool(np.any(force)),
             coins=frame.result.coins,
             success=frame.result.success,
             camera=screen.camera.mode,

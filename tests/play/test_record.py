@@ -46,7 +46,7 @@ class Game:
 
     def is_served(self) -> bool:
         assert self._process.poll() is None, self._process.communicate()[0]
-        return is_served(LOOPBACK, self.port)
+        return is_served(self.url)
 
     def end(self, number: signal.Signals) -> tuple[int, str]:
         """End it with a signal, and return its status and what it wrote."""
