@@ -62,6 +62,7 @@ DRAWS_WHEN_TOLD: Final = """(() => {
             this.addEventListener("message", () => { heard += 1 })
         }
     }
+    window.heard = () => heard
     // What is drawn stays on the canvas until this task is over.
     window.look = () => {
         for (const callback of due.splice(0)) callback(performance.now())

@@ -15,8 +15,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any, Final, NamedTuple
-from urllib.error import URLError
-from urllib.request import urlopen
+from urllib.request import ProxyHandler, build_opener
 
 import numpy as np
 
@@ -89,6 +88,8 @@ def free_port() -> int:
 EMPTY_SCENE_BYTES: Final = 100_000
 """More than Studio's empty scene, and less than any level with its textures."""
 
+WITHOUT_PROXY: Final = build_opener(ProxyHandler({}))
+
 
 def is_served(url: str) -> bool:
     """Say whether a level is served there.
@@ -97,9 +98,9 @@ def is_served(url: str) -> bool:
     say "Parsing model..." for ever, and show the panels over nothing (seen with MuJoCo 4.0.0).
     """
     try:
-        with urlopen(f"{url}model?total_bytes", timeout=STALLED_S) as reply:
+        with WITHOUT_PROXY.open(f"{url}model?total_bytes", timeout=STALLED_S) as reply:
             return int(json.load(reply)["total_bytes"]) > EMPTY_SCENE_BYTES
-    except URLError:
+    except OSError:
         return False
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from typing import Any, Final
 
@@ -10,6 +11,7 @@ from mujoco.studio.web.web_server import _SessionMessage as StudioMessage
 from websockets.sync.client import connect
 
 from roller_env.play.app import ANSWER_S
+from roller_env.play.server import STALE_PAGE_S
 from roller_env.play.session import Phase
 from tests.patience import STALLED_S
 from tests.play.browser import (
@@ -146,6 +148,15 @@ def test_neither_the_mouse_nor_keys_of_studio_change_the_view(page: Browser, sta
     page.page.mouse.up()
     assert differing(after, before) < 0.05
     assert stand.status.phase is Phase.PLAYING
+
+
+def test_a_page_that_draws_nothing_is_sent_little(page: Browser) -> None:
+    # It would have to draw all of that before it shows what is now.
+    page.look()
+    began_s = time.monotonic()
+    page.page.wait_for_function("count => heard() >= count", arg=page.heard + 20, polling=20)
+    # Panels and state ten times each; a page that draws is sent them in a sixth of a second.
+    assert time.monotonic() - began_s > 5 * STALE_PAGE_S
 
 
 def test_a_second_browser_watches_and_cannot_steer(
