@@ -1,10 +1,14 @@
 """Forces and torques on rigid bodies, and the derivative that an integrator follows.
 
 A **load** is a function ``(state, t) -> Wrench``: it may depend on the state and on the time.
-`total` adds loads, `derivative_of` makes of a load what the integrators take. What a player
-holds (keys, a lift) changes by jumps, which no method of high order can follow inside a step:
-it is a function of time alone, sampled at the beginning of a step and held through it (`held`),
-just as MuJoCo holds ``ctrl`` and ``xfrc_applied``.
+What it returns is a force and a torque for **each** body, two arrays (N, 3): whoever calls a load
+(`total`, `on_axle`, the integrators) has `checked` it, and nothing is stretched to fit. A plain
+pair of nested lists will do as well.
+
+`total` adds loads, `derivative_of` makes of a load what the integrators take. What a player holds
+(keys, a lift) changes by jumps, which no method of high order can follow inside a step: it is a
+function of time alone, sampled at the beginning of a step and held through it (`held`), just as
+MuJoCo holds ``ctrl`` and ``xfrc_applied``.
 
 SI units, world frame, torques about the centre of mass.
 
@@ -27,12 +31,16 @@ from roller_env.rigid_body import quaternion
 from roller_env.rigid_body.arrays import (
     Float64,
     cross,
+    direction,
     dot,
+    finite_number,
     fitting_column,
     fitting_rows,
+    floats,
     non_negative,
     numbers,
     read_only,
+    row_or_rows,
     rows,
 )
 from roller_env.rigid_body.state import State
@@ -66,6 +74,37 @@ class Wrench(NamedTuple):
 
 Load = Callable[[State, float], Wrench]
 """What acts on the bodies in a state at a time, s."""
+
+
+def checked(load: Load, state: State, t: float) -> Wrench:
+    """Return what ``load`` gives, float64 (N, 3) and (N, 3), or refuse it.
+
+    The numbers themselves are not checked: a motion that blew up has infinite forces.
+
+    Raises:
+        ValueError: when it is no pair, or a half is not real numbers of the shape (N, 3).
+    """
+    given = load(state, t)
+    if not isinstance(given, (tuple, list)) or len(given) != len(Wrench._fields):
+        raise ValueError(
+            f"a load must return a Wrench, which is a force and a torque, got {given!r}"
+        )
+    return Wrench(
+        *(
+            _for_each_body(name, value, state.count)
+            for name, value in zip(Wrench._fields, given, strict=True)
+        )
+    )
+
+
+def _for_each_body(name: str, value: npt.ArrayLike, count: int) -> Float64:
+    of_load = f"the load's {name}"
+    array = value
+    if not (isinstance(array, np.ndarray) and array.dtype == np.float64):
+        array = floats(of_load, value)
+    if array.shape != (count, 3):
+        raise ValueError(f"{of_load} must have shape ({count}, 3), got {array.shape}")
+    return array
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,17 +152,11 @@ def derivative_of(load: Load) -> DerivativeFunction:
     """Return the derivative under ``load``.
 
     Raises:
-        ValueError: from the returned function, when the load gives another shape than (N, 3).
+        ValueError: from the returned function, as `checked`.
     """
 
     def derivative(state: State, t: float) -> Derivative:
-        wrench = load(state, t)
-        for name, value in zip(Wrench._fields, wrench, strict=True):
-            if np.shape(value) != (state.count, 3):
-                raise ValueError(
-                    f"the load's {name} must have shape ({state.count}, 3), got {np.shape(value)}"
-                )
-        return Derivative(state, wrench)
+        return Derivative(state, checked(load, state, t))
 
     return derivative
 
@@ -140,7 +173,7 @@ def total(*loads: Load) -> Load:
     def load(state: State, t: float) -> Wrench:
         wrench = none(state, t)
         for one in loads:
-            added = one(state, t)
+            added = checked(one, state, t)
             wrench = Wrench(wrench.force + added.force, wrench.torque + added.torque)
         return wrench
 
@@ -151,7 +184,7 @@ def constant(
     force: npt.ArrayLike = (0.0, 0.0, 0.0), torque: npt.ArrayLike = (0.0, 0.0, 0.0)
 ) -> Load:
     """Return a force, N, and a torque, N m, that never change; each (3,) or (N, 3)."""
-    force_n, torque_nm = numbers("force", force), numbers("torque", torque)
+    force_n, torque_nm = row_or_rows("force", force, 3), row_or_rows("torque", torque, 3)
 
     def load(state: State, _t: float) -> Wrench:
         still = np.zeros((state.count, 3))
@@ -168,7 +201,7 @@ def gravity(acceleration: npt.ArrayLike) -> Load:
 
     The report's up is y and the game's is z, so there is no default.
     """
-    field = numbers("acceleration", acceleration)
+    field = row_or_rows("acceleration", acceleration, 3)
 
     def load(state: State, _t: float) -> Wrench:
         weight = state.body.mass[:, None] * fitting_rows("acceleration", field, state.count, 3)
@@ -198,7 +231,7 @@ def driving_torque(torque: npt.ArrayLike = (1.0, 0.0, 0.0), damping: npt.ArrayLi
         torque: N m, (3,) or (N, 3), world frame.
         damping: N m s, one number or (N,), not negative.
     """
-    drive, c = numbers("torque", torque), non_negative("damping", damping)
+    drive, c = row_or_rows("torque", torque, 3), non_negative("damping", damping)
 
     def load(state: State, _t: float) -> Wrench:
         resisting = fitting_column("damping", c, state.count) * state.angular_velocity
@@ -235,7 +268,7 @@ def push_at(force: npt.ArrayLike, body_point: npt.ArrayLike, *, in_body: bool = 
         in_body: whether the force turns with the body, as a thruster's does. Otherwise it keeps
             its direction in the world.
     """
-    push, point = numbers("force", force), numbers("body_point", body_point)
+    push, point = row_or_rows("force", force, 3), row_or_rows("body_point", body_point, 3)
 
     def load(state: State, _t: float) -> Wrench:
         still = np.zeros((state.count, 3))
@@ -262,15 +295,11 @@ def on_axle(load: Load, axis: npt.ArrayLike) -> Load:
     Raises:
         ValueError: on an axis of length 0 or of a wrong shape.
     """
-    direction = numbers("axis", axis)
-    length = np.sqrt(dot(direction, direction))
-    if (length == 0.0).any():
-        raise ValueError("axis must not be the zero vector: it has no direction")
-    unit = direction / length[..., None]
+    unit = direction("axis", row_or_rows("axis", axis, 3))
 
     def held_load(state: State, t: float) -> Wrench:
         along = fitting_rows("axis", unit, state.count, 3)
-        wrench = load(state, t)
+        wrench = checked(load, state, t)
         return Wrench(np.zeros_like(wrench.force), dot(wrench.torque, along)[:, None] * along)
 
     return held_load
@@ -316,6 +345,7 @@ class PiecewiseConstantForce:
 
     def force_at_time(self, t: float) -> Float64:
         """Return the force at t, (3,) or (N, 3) N; at a switch, the new one."""
+        t = finite_number("t", t)
         index = int(np.searchsorted(self.switches_s, t + SWITCH_SLACK_S, side="right")) - 1
         return self.forces[index] if index >= 0 else np.zeros_like(self.forces[0])
 

@@ -26,7 +26,21 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.rigid_body import quaternion
-from roller_env.rigid_body.arrays import Float64, dot, numbers, positive, read_only, rows, scalars
+from roller_env.rigid_body.arrays import (
+    Float64,
+    chosen,
+    dot,
+    floats,
+    numbers,
+    positive,
+    read_only,
+    rows,
+    scalars,
+    whole,
+)
+
+_LEAST, _MOST = 1e-300, 1e300
+"""Masses, kg, and moments, kg m^2, within which they, their sums and inverses are exact floats."""
 
 _TRIANGLE_SLACK = 1e-9
 """Relative rounding allowed before three moments of inertia are called impossible."""
@@ -73,7 +87,8 @@ class Body:
         number = _count(count, edge.shape, np.shape(mass))
         edges = scalars("size", edge, number)
         masses = scalars("mass", positive("mass", mass), number)
-        moment = edges**2 * masses / 6.0
+        with np.errstate(over="ignore", under="ignore"):
+            moment = edges**2 * masses / 6.0
         return cls._made(np.stack([edges] * 3, axis=-1), masses, np.stack([moment] * 3, axis=-1))
 
     @classmethod
@@ -94,10 +109,10 @@ class Body:
         number = _count(count, edges.shape[:-1], np.shape(mass))
         edges = rows("size", edges, number, 3)
         masses = scalars("mass", positive("mass", mass), number)
-        squares = edges**2
-        moments = (
-            masses[:, None] / 12.0 * (np.roll(squares, -1, axis=1) + np.roll(squares, 1, axis=1))
-        )
+        with np.errstate(over="ignore", under="ignore"):
+            squares = edges**2
+            of_both = np.roll(squares, -1, axis=1) + np.roll(squares, 1, axis=1)
+            moments = masses[:, None] / 12.0 * of_both
         return cls._made(edges, masses, moments)
 
     @classmethod
@@ -119,6 +134,7 @@ class Body:
         number = _count(count, moments.shape[:-1], np.shape(mass))
         moments = rows("inertia", moments, number, 3)
         masses = scalars("mass", positive("mass", mass), number)
+        _check_range("inertia", moments)
         total = moments.sum(axis=1, keepdims=True)
         excess = total - 2.0 * moments
         if (excess < -_TRIANGLE_SLACK * total).any():
@@ -127,11 +143,14 @@ class Body:
                 f"inertia {wrong.tolist()} belongs to no body: "
                 "no moment may exceed the sum of the other two"
             )
-        edges = np.sqrt(6.0 * np.maximum(excess, 0.0) / masses[:, None])
+        # Two roots, since the quotient of what they are of may be out of range.
+        edges = np.sqrt(6.0 * np.maximum(excess, 0.0)) / np.sqrt(masses)[:, None]
         return cls._made(edges, masses, moments)
 
     @classmethod
     def _made(cls, size: Float64, mass: Float64, inertia: Float64) -> Body:
+        _check_range("mass", mass)
+        _check_range("inertia (it follows from size and mass)", inertia)
         values = (size, mass, 1.0 / mass, inertia, 1.0 / inertia)
         return cls(*(read_only(value) for value in values))
 
@@ -151,14 +170,34 @@ class Body:
         return np.argsort(self.inertia, axis=1, kind="stable")
 
     def take(self, indices: npt.ArrayLike) -> Body:
-        """Return the bodies at ``indices`` (K,), which may repeat one."""
-        index = np.asarray(indices, dtype=np.intp)
+        """Return the bodies at ``indices`` (K,), which may repeat one, or under a mask (N,).
+
+        Raises:
+            ValueError: on rows that are not there, fractions, a mask of another length, or none.
+        """
+        index = chosen("indices", indices, self.count)
         return Body._made(self.size[index], self.mass[index], self.inertia[index])
+
+
+def _check_range(name: str, value: Float64) -> None:
+    """Refuse what has no inverse, or is none: beyond them energies are 0, infinite or NaN.
+
+    Raises:
+        ValueError: naming the first value that is outside `_LEAST` to `_MOST`.
+    """
+    outside = ~((value >= _LEAST) & (value <= _MOST))
+    if outside.any():
+        raise ValueError(
+            f"{name} must be from {_LEAST:g} to {_MOST:g}, to have an inverse, "
+            f"got {value[outside][0]:g}"
+        )
 
 
 def _count(count: int | None, *shapes: tuple[int, ...]) -> int:
     """Return the number of bodies that the arguments' leading axes ask for."""
-    lengths = {shape[0] for shape in shapes if shape} | ({count} if count is not None else set())
+    lengths = {shape[0] for shape in shapes if shape}
+    if count is not None:
+        lengths.add(whole("count", count, 1))
     wanted = lengths - {1} or {1}
     if len(wanted) > 1:
         raise ValueError(
@@ -241,18 +280,20 @@ class State:
 
         Raises:
             ValueError: a wrong shape, NaN, a quaternion far from unit, or a velocity and its
-                momentum both given.
+                momentum both given; or a momentum that is too large to be a number.
         """
         count = body.count
         q = rows("orientation", quaternion.checked_unit("orientation", orientation), count, 4)
         given = _one_of("velocity", velocity, "momentum", momentum)
         linear = rows(*given, count, 3)
-        if velocity is not None:
-            linear *= body.mass[:, None]
+        with np.errstate(over="ignore", invalid="ignore"):
+            linear = linear if velocity is None else linear * body.mass[:, None]
         given = _one_of("angular_velocity", angular_velocity, "angular_momentum", angular_momentum)
         angular = rows(*given, count, 3)
-        if angular_velocity is not None:
-            angular = _tensor_product(body, body.inertia, q, angular)
+        with np.errstate(over="ignore", invalid="ignore"):
+            if angular_velocity is not None:
+                angular = _tensor_product(body, body.inertia, q, angular)
+        linear, angular = numbers("momentum", linear), numbers("angular_momentum", angular)
         where = rows("position", position, count, 3)
         return cls(body, *(read_only(value) for value in (where, linear, q, angular)))
 
@@ -343,11 +384,21 @@ class State:
         return read_only(matrix)
 
     def over_inertia(self, vector: Float64) -> Float64:
-        """Return I^-1 ``vector``, both (N, 3) world frame: torque to angular acceleration."""
+        """Return I^-1 ``vector``, both (N, 3) world frame: torque to angular acceleration.
+
+        Raises:
+            ValueError: on another shape.
+        """
+        _same_shape("vector", vector, self.momentum)
         return _tensor_product(self.body, self.body.inverse_inertia, self.rotation, vector)
 
     def times_inertia(self, vector: Float64) -> Float64:
-        """Return I ``vector``, both (N, 3) in the world frame: angular velocity to momentum."""
+        """Return I ``vector``, both (N, 3) in the world frame: angular velocity to momentum.
+
+        Raises:
+            ValueError: on another shape.
+        """
+        _same_shape("vector", vector, self.momentum)
         return _tensor_product(self.body, self.body.inertia, self.rotation, vector)
 
     def points_to_world(self, points: npt.ArrayLike) -> Float64:
@@ -401,8 +452,8 @@ class State:
         return finite
 
     def take(self, indices: npt.ArrayLike) -> State:
-        """Return the bodies at ``indices`` (K,), which may repeat one, as a state of their own."""
-        index = np.asarray(indices, dtype=np.intp)
+        """Return some bodies as a state of their own; argument and errors as `Body.take`."""
+        index = chosen("indices", indices, self.count)
         primary = (self.position, self.momentum, self.orientation, self.angular_momentum)
         taken = (read_only(value[index]) for value in primary)
         return State(self.body.take(index), *taken, normalised=self.normalised)
@@ -428,6 +479,11 @@ def _tensor_product(body: Body, diagonal: Float64, q: Float64, vector: Float64) 
 def _replaced(name: str, new: Float64 | None, old: Float64) -> Float64:
     if new is None:
         return old
-    if new.shape != old.shape:
-        raise ValueError(f"{name} must have shape {old.shape}, got {new.shape}")
-    return read_only(np.array(new, dtype=np.float64))
+    array = floats(name, new)
+    _same_shape(name, array, old)
+    return read_only(array)
+
+
+def _same_shape(name: str, new: Float64, old: Float64) -> None:
+    if np.shape(new) != old.shape:
+        raise ValueError(f"{name} must have shape {old.shape}, got {np.shape(new)}")

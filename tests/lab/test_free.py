@@ -124,7 +124,7 @@ def test_mujocos_euler_family_falls_too_far_by_half_a_step(
 
 @pytest.mark.parametrize("dt_s", [0.1, 0.05, 0.02])
 def test_runge_kutta_is_late_by_the_predicted_angle_at_constant_spin(dt_s: float) -> None:
-    predicted = CONSTANT_SPIN.horizon_s * 3.0 * (3.0 * dt_s) ** 4 / 1920.0
+    predicted = CONSTANT_SPIN.horizon_s * 3.0 * (3.0 * dt_s) ** 4 / 5120.0
     assert errors(CONSTANT_SPIN, RigidBodyMethod(RK4), dt_s)["attitude"] == pytest.approx(
         predicted, rel=2e-2
     )
