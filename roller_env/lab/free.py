@@ -50,7 +50,7 @@ MOMENTS: Final = 10
 FAILURE: Final = 1.0
 """An error as large as the motion itself (or a radian): nothing is left of the answer."""
 
-_RIGID_BODY_PART_STEPS: Final = 20
+_RIGID_BODY_PART_STEPS: Final = 5000
 _MUJOCO_PART_STEPS: Final = 1000
 """Steps that are timed: some milliseconds, against which starting the clock is nothing."""
 

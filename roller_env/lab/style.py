@@ -32,6 +32,7 @@ COLOURS: Final[dict[str, str]] = {
     "ours explicit_euler": "#8d6e63",
     "ours semi_implicit_euler": "#b58900",
     "ours rk4": "#ef8e19",
+    "ours rk4_body": "#c9a227",
     "ours lie_rk4": "#3a8f5c",
     "ours buss2": "#9ccc65",
     "ours buss3": "#5f9ea0",

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.rigid_body import quaternion
+from roller_env.rigid_body import kernels, quaternion
 from roller_env.rigid_body.arrays import (
     Float64,
     chosen,
@@ -169,6 +169,18 @@ class Body:
         """The body axes in order of rising moment of inertia, (N, 3)."""
         return np.argsort(self.inertia, axis=1, kind="stable")
 
+    @cached_property
+    def constants(self) -> kernels.Bodies:
+        """The same values as compiled loops take them."""
+        return kernels.Bodies(
+            self.mass,
+            self.inverse_mass,
+            self.inertia,
+            self.inverse_inertia,
+            self.axes_by_inertia.astype(np.int64),
+            (self.inertia == self.inertia[:, :1]).all(axis=1),
+        )
+
     def take(self, indices: npt.ArrayLike) -> Body:
         """Return the bodies at ``indices`` (K,), which may repeat one, or under a mask (N,).
 
@@ -246,6 +258,8 @@ class State:
             recalculated with ``renormalise=False``; the rotation is then that of its direction.
         angular_momentum: (N, 3) about the centre of mass, world frame, kg m^2/s.
         normalised: whether the orientation has been scaled to norm 1.
+        own_momentum: ``body_angular_momentum`` to the last bit, (N, 3), in a state of a method that
+            keeps that instead; None: it follows.
     """
 
     body: Body
@@ -254,6 +268,7 @@ class State:
     orientation: Float64
     angular_momentum: Float64
     normalised: bool = field(default=True, kw_only=True)
+    own_momentum: Float64 | None = field(default=None, kw_only=True, repr=False)
 
     @classmethod
     def create(
@@ -331,7 +346,8 @@ class State:
             _replaced("angular_momentum", angular_momentum, self.angular_momentum),
         ]
         if orientation is None:
-            return State(self.body, *values, normalised=self.normalised)
+            own = self.own_momentum if angular_momentum is None else None
+            return State(self.body, *values, normalised=self.normalised, own_momentum=own)
         if renormalise:
             values[2] = read_only(quaternion.normalise(values[2]))
         return State(self.body, *values, normalised=renormalise)
@@ -350,6 +366,13 @@ class State:
     def angular_velocity(self) -> Float64:
         """Angular velocity, (N, 3) rad/s, world frame: R I^-1 R^T L; on cubes simply L / I."""
         return read_only(self.over_inertia(self.angular_momentum))
+
+    @cached_property
+    def body_angular_momentum(self) -> Float64:
+        """Angular momentum in **body** axes, (N, 3) kg m^2/s: what Euler's equations move."""
+        if self.own_momentum is not None:
+            return self.own_momentum
+        return read_only(quaternion.rotate_inverse(self.rotation, self.angular_momentum))
 
     @cached_property
     def spin(self) -> Float64:
@@ -382,6 +405,37 @@ class State:
         matrix[:, :3, 3] = -np.einsum("nij,nj->ni", back, self.position)
         matrix[:, 3, 3] = 1.0
         return read_only(matrix)
+
+    def rows(self, *, body_axes: bool = False) -> Float64:
+        """Return the primary values as compiled loops take them, (N, `kernels.POINT`).
+
+        Args:
+            body_axes: the last three numbers of a row are the angular momentum in body axes.
+        """
+        rows = np.zeros((self.count, kernels.POINT))
+        rows[:, 0:3] = self.position
+        rows[:, 3:6] = self.momentum
+        rows[:, 6:10] = self.orientation
+        rows[:, 10:13] = self.angular_momentum
+        if body_axes:
+            rows[:, 13:16] = self.body_angular_momentum
+        return rows
+
+    def from_rows(self, rows: Float64, *, normalised: bool, body_axes: bool) -> State:
+        """Return these bodies in the state of ``rows``; the inverse of `rows`."""
+        x, p, q, momentum, own = (
+            read_only(np.ascontiguousarray(rows[:, first:end]))
+            for first, end in ((0, 3), (3, 6), (6, 10), (10, 13), (13, 16))
+        )
+        return State(
+            self.body,
+            x,
+            p,
+            q,
+            momentum,
+            normalised=normalised,
+            own_momentum=own if body_axes else None,
+        )
 
     def over_inertia(self, vector: Float64) -> Float64:
         """Return I^-1 ``vector``, both (N, 3) world frame: torque to angular acceleration.
@@ -456,7 +510,8 @@ class State:
         index = chosen("indices", indices, self.count)
         primary = (self.position, self.momentum, self.orientation, self.angular_momentum)
         taken = (read_only(value[index]) for value in primary)
-        return State(self.body.take(index), *taken, normalised=self.normalised)
+        own = None if self.own_momentum is None else read_only(self.own_momentum[index])
+        return State(self.body.take(index), *taken, normalised=self.normalised, own_momentum=own)
 
 
 def _one_of(
