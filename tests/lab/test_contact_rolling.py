@@ -25,8 +25,8 @@ from roller_env.lab.contact.scene import (
     resting_depth,
     soft_contact,
 )
-from roller_env.lab.contact.trial import Path
 from roller_env.lab.methods import MUJOCO, PYRAMIDAL, MujocoMethod
+from roller_env.lab.simulate import Path
 
 RK4 = MujocoMethod("RK4")
 EULER_FAMILY = tuple(method for method in MUJOCO if method != RK4)

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roller_env.lab.experiment import SteadyTrial, measure
 from roller_env.lab.free import (
     ASYMMETRIC_TOP,
     BENCHMARK_BOX,
@@ -28,6 +27,7 @@ from roller_env.lab.free import (
     one_two_five,
 )
 from roller_env.lab.methods import FREE, MUJOCO, Method, MujocoMethod, RigidBodyMethod
+from roller_env.lab.scene import SteadyTrial, measure
 from roller_env.rigid_body import (
     EXPLICIT_EULER,
     LIE_RK4,
@@ -184,8 +184,8 @@ def test_drag_blows_up_just_beyond_the_predicted_step(name: str) -> None:
 
 def test_a_failed_run_is_a_point_that_says_so_and_not_an_exception() -> None:
     (shown, *_) = measure(DRAG, RigidBodyMethod(EXPLICIT_EULER), 1.0, 1)
-    assert shown.failed
-    assert shown.error > 1.0
+    assert shown["failed"]
+    assert shown["error"] > 1.0
 
 
 # --- the scenes as such ----------------------------------------------------------------------

@@ -28,9 +28,10 @@ from roller_env.compile.mjcf import build_spec
 from roller_env.config import make_config
 from roller_env.game.actions import KEY_FORCE_N, forces, held_keys
 from roller_env.lab.contact.scene import ContactScene, Float64
-from roller_env.lab.contact.trial import Held, MujocoTrial, Path, steps_of
-from roller_env.lab.experiment import Measure
+from roller_env.lab.contact.trial import Held, MujocoTrial, steps_of
 from roller_env.lab.methods import MUJOCO, MujocoMethod
+from roller_env.lab.scene import Measure
+from roller_env.lab.simulate import Path
 from roller_env.level import Level, load_level
 from roller_env.physics.presets import PRESETS
 from roller_env.simulation import Simulation

@@ -23,9 +23,10 @@ from roller_env.lab.contact.scene import (
     game_contact,
     new_spec,
 )
-from roller_env.lab.contact.trial import Held, MujocoTrial, Path, steps_of
-from roller_env.lab.experiment import Measure
+from roller_env.lab.contact.trial import Held, MujocoTrial, steps_of
 from roller_env.lab.methods import MUJOCO, MujocoMethod
+from roller_env.lab.scene import Measure
+from roller_env.lab.simulate import Path
 from roller_env.physics.materials import IMPEDANCE, damping_ratio
 from roller_env.physics.presets import PhysicsPreset
 

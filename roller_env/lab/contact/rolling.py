@@ -43,9 +43,10 @@ from roller_env.lab.contact.scene import (
     resting_depth,
     soft_contact,
 )
-from roller_env.lab.contact.trial import Held, MujocoTrial, Path, at_most, steps_of
-from roller_env.lab.experiment import Measure
+from roller_env.lab.contact.trial import Held, MujocoTrial, at_most, steps_of
 from roller_env.lab.methods import MUJOCO, PYRAMIDAL, MujocoMethod
+from roller_env.lab.scene import Measure
+from roller_env.lab.simulate import Path
 
 REFERENCE: Final = MujocoMethod("RK4")
 """With a small step: what the same soft model does as the step vanishes."""

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.lab.contact.trial import MujocoTrial
-from roller_env.lab.experiment import Measure
 from roller_env.lab.methods import Method, MujocoMethod
+from roller_env.lab.scene import Measure
 from roller_env.physics.materials import IMPEDANCE, contact_parameters
 from roller_env.physics.presets import PRESETS, PhysicsPreset
 from roller_env.units import quants
@@ -37,7 +37,7 @@ its own, and their creep would hide what integrators do."""
 
 @dataclass(frozen=True)
 class ContactScene(ABC):
-    """A scene that MuJoCo simulates; see `roller_env.lab.experiment.Scene`.
+    """A scene that MuJoCo simulates; see `roller_env.lab.scene.Scene`.
 
     Contact parameters never follow the time step where an error is called discretisation: at every
     step, and for the reference, it is the same soft contact.

@@ -434,54 +434,32 @@ def _worst(values: Float64) -> float:
     return float(values.max()) if np.isfinite(values).all() else math.inf
 
 
-@dataclass(frozen=True, slots=True)
-class Errors:
-    """What one setting gets wrong.
+Errors = dict[str, float]
+"""What one setting gets wrong, by the names of `MEANINGS`."""
 
-    Attributes:
-        path: distance from a rigid ball's place after 5 s of driving over the way rolled; worst of
-            twelve sequences of keys.
-        heading_deg: largest error of the direction in which keys push, of all eight.
-        landing_share: depth of the landing after 46.9 m over that at which a ball falls through.
-        fastest_share: the same for 36 m/s.
-        tunnels_at_m_s: least speed tried at which a ball passes a deck of 16 quants; or infinite.
-        elasticity: largest error of the coefficient of restitution, of five and at seven speeds.
-        friction: largest error of the coefficient of friction, measured on skids.
-        skid_speed: largest relative error of the speed at which a skid ends.
-        skid_heading_deg: largest bend of a skid's way.
-        hop_mm: highest that a ball skidding at 4 m/s hops.
-        rest_mm: how deep a ball lies in the ground half a second after it was put there.
-        lift: relative error of the height to which a lift pad throws.
-        seam_mm: highest bump at a seam of classic's bridge, at 3 to 15 m/s.
-        movers: largest relative error of the speed of a plate or gate under the ball.
-        ringing: how much that speed goes up and down once it is reached, over the speed.
-        carried_mm: how deep the ball is in what sinks under it.
-        squeeze_mm: deepest contact while a hanging gate presses on the ball.
-        lane_mm: highest bump on a lane of 49 seams that cannot be merged, at 7.5 to 15 m/s.
-        lane_share: of these speeds, the share at which that bump is over one quant.
-        course: distance from the converged model's place on the classic course over the way.
-    """
-
-    path: float
-    heading_deg: float
-    landing_share: float
-    fastest_share: float
-    tunnels_at_m_s: float
-    elasticity: float
-    friction: float
-    skid_speed: float
-    skid_heading_deg: float
-    hop_mm: float
-    rest_mm: float
-    lift: float
-    seam_mm: float
-    movers: float
-    ringing: float
-    carried_mm: float
-    squeeze_mm: float
-    lane_mm: float
-    lane_share: float
-    course: float
+MEANINGS: Final = {
+    "path": "distance from a rigid ball's place after 5 s of driving over the way rolled; worst of "
+    "twelve sequences of keys",
+    "heading_deg": "largest error of the direction in which keys push, of all eight",
+    "landing_share": "depth of the landing after 46.9 m over that at which a ball falls through",
+    "fastest_share": "the same for 36 m/s",
+    "tunnels_at_m_s": "least speed tried at which a ball passes a deck of 16 quants; or infinite",
+    "elasticity": "largest error of the coefficient of restitution, of five and at seven speeds",
+    "friction": "largest error of the coefficient of friction, measured on skids",
+    "skid_speed": "largest relative error of the speed at which a skid ends",
+    "skid_heading_deg": "largest bend of a skid's way",
+    "hop_mm": "highest that a ball skidding at 4 m/s hops",
+    "rest_mm": "how deep a ball lies in the ground half a second after it was put there",
+    "lift": "relative error of the height to which a lift pad throws",
+    "seam_mm": "highest bump at a seam of classic's bridge, at 3 to 15 m/s",
+    "movers": "largest relative error of the speed of a plate or gate under the ball",
+    "ringing": "how much that speed goes up and down once it is reached, over the speed",
+    "carried_mm": "how deep the ball is in what sinks under it",
+    "squeeze_mm": "deepest contact while a hanging gate presses on the ball",
+    "lane_mm": "highest bump on a lane of 49 seams that cannot be merged, at 7.5 to 15 m/s",
+    "lane_share": "of these speeds, the share at which that bump is over one quant",
+    "course": "distance from the converged model's place on the classic course over the way",
+}
 
 
 _MEASURES: Final[Sequence[Callable[[Setting], dict[str, float]]]] = (
@@ -502,15 +480,15 @@ def errors_of(setting: Setting, reference_hz: int = REFERENCE_HZ) -> Errors:
     values = course(setting, reference_hz)
     for measure in _MEASURES:
         values |= measure(setting)
-    return Errors(**values)
+    return values
 
 
 @dataclass(frozen=True, slots=True)
-class Criterion:
+class Requirement:
     """What the game can bear.
 
     Attributes:
-        name: of the field of `Errors`.
+        name: in `MEANINGS`.
         label: for tables and charts; after a comma the unit.
         limit: largest bearable value.
         reason: why that.
@@ -533,29 +511,32 @@ class Criterion:
 
 
 _ASKED: Final = "asked of the default preset"
+_FALLS: Final = "deeper, it falls through"
 _NOT_SEEN: Final = "a fiftieth of the radius is not seen"
-CRITERIA: Final = (
-    Criterion("path", "path after 5 s of driving", 0.01, _ASKED),
-    Criterion("heading_deg", "heading of the keys, °", 0.5, _ASKED),
-    Criterion("landing_share", "landing from 46.9 m", 1.0, "deeper, it falls through"),
-    Criterion("fastest_share", "landing at 36 m/s", 1.0, "deeper, it falls through"),
-    Criterion("elasticity", "elasticity", 0.02, _ASKED),
-    Criterion("friction", "friction", 0.02, _ASKED),
-    Criterion("skid_speed", "speed after a skid", 0.01, "as for the path"),
-    Criterion("skid_heading_deg", "bend of a skid, °", 0.5, "as for the keys"),
-    Criterion("rest_mm", "depth at rest, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
-    Criterion("lift", "height of the lift", 0.01, "as for the path"),
-    Criterion("seam_mm", "bump of a seam, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
-    Criterion("movers", "speed of plate and gate", 0.01, "as for the path"),
-    Criterion("ringing", "ringing of plate and gate", 0.01, "as for the path"),
-    Criterion("carried_mm", "depth on plate and gate, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
-    Criterion("squeeze_mm", "depth under a gate, mm", 1e3 * THROUGH_M, "deeper, it falls through"),
-    Criterion("lane_share", "thrown by a lane of seams", 0.1, "one speed in ten"),
-    Criterion("course", "course of classic", 0.01, "as for the path"),
+REQUIREMENTS: Final = (
+    Requirement("path", "path after 5 s of driving", 0.01, _ASKED),
+    Requirement("heading_deg", "heading of the keys, °", 0.5, _ASKED),
+    Requirement("landing_share", "landing from 46.9 m", 1.0, _FALLS),
+    Requirement("fastest_share", "landing at 36 m/s", 1.0, _FALLS),
+    Requirement("elasticity", "elasticity", 0.02, _ASKED),
+    Requirement("friction", "friction", 0.02, _ASKED),
+    Requirement("skid_speed", "speed after a skid", 0.01, "as for the path"),
+    Requirement("skid_heading_deg", "bend of a skid, °", 0.5, "as for the keys"),
+    Requirement("rest_mm", "depth at rest, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
+    Requirement("lift", "height of the lift", 0.01, "as for the path"),
+    Requirement("seam_mm", "bump of a seam, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
+    Requirement("movers", "speed of plate and gate", 0.01, "as for the path"),
+    Requirement("ringing", "ringing of plate and gate", 0.01, "as for the path"),
+    Requirement("carried_mm", "depth on plate and gate, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
+    Requirement(
+        "squeeze_mm", "depth under a gate, mm", 1e3 * THROUGH_M, "deeper, it falls through"
+    ),
+    Requirement("lane_share", "thrown by a lane of seams", 0.1, "one speed in ten"),
+    Requirement("course", "course of classic", 0.01, "as for the path"),
 )
 """The hop of a skid has no limit here, since what cures it costs the course; see the docs."""
 
 
-def broken(errors: Errors) -> list[Criterion]:
-    """Return the criteria that are not met."""
-    return [one for one in CRITERIA if not getattr(errors, one.name) <= one.limit]
+def violations(errors: Errors) -> list[Requirement]:
+    """Return the requirements that are not met."""
+    return [one for one in REQUIREMENTS if not errors[one.name] <= one.limit]

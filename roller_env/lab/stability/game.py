@@ -8,12 +8,13 @@ from typing import Any, Final
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from roller_env.compile.compiled import CompiledLevel
+from roller_env.lab.simulate import Float64, record, started
 from roller_env.level import Level, load_level
 
-Float64 = npt.NDArray[np.float64]
+LOST: Final = 1e6
+"""No number of a ball in the game is so large, m, m/s or rad/s."""
 
 GROUND: Final[Mapping[str, Any]] = {"at": (0.0, 0.0, -2.0), "size": (400.0, 400.0, 4.0)}
 """A wide thick floor with its upper face at z = 0."""
@@ -97,20 +98,24 @@ def play(course: Course, seconds: float) -> Run:
     """Simulate, and look at every step."""
     compiled = course.compiled
     model, level = compiled.model, compiled.level
-    data = mujoco.MjData(model)
-    course.prepare(data)
+    data = started(model, course.prepare)
     steps = round(seconds / compiled.preset.dt_s)
-    motion = np.full((steps + 1, 9), np.nan)
     depth = np.zeros(steps + 1)
-    velocity = slice(compiled.ball_qvel, compiled.ball_qvel + 6)
-    for index in range(steps + 1):
-        # Contacts of this very position; the step below finds them again by itself.
+    first = compiled.ball_qvel
+
+    def look(step: int) -> None:
+        # Contacts of this very position; the step after it finds them again by itself.
         mujoco.mj_fwdPosition(model, data)
-        motion[index, :3], motion[index, 3:] = data.qpos[course.ball], data.qvel[velocity]
-        depth[index] = -min(0.0, data.contact.dist.min()) if data.ncon else 0.0
-        if not np.abs(motion[index]).max() < 1e6:
-            break
-        mujoco.mj_step(model, data)
+        depth[step] = -min(0.0, data.contact.dist.min()) if data.ncon else 0.0
+
+    def sane() -> bool:
+        ball = (*data.qpos[course.ball], *data.qvel[first : first + 6])
+        return bool(np.abs(ball).max() < LOST)
+
+    path = record(model, data, steps, before=look, goes_on=sane)
+    motion = np.full((steps + 1, 9), np.nan)
+    motion[: len(path.time), :3] = path.qpos[:, course.ball]
+    motion[: len(path.time), 3:] = path.qvel[:, first : first + 6]
     # A sphere's energy of spin for each kg is (R w)² / 5.
     rim = level.ball.radius * motion[:, 6:]
     energy = 0.5 * (motion[:, 3:6] ** 2).sum(1) + 0.2 * (rim**2).sum(1)
@@ -121,5 +126,5 @@ def play(course: Course, seconds: float) -> Run:
         velocity=motion[:, 3:6],
         energy=energy + level.gravity * motion[:, 2] - work / level.ball.mass_kg,
         depth=depth,
-        finite=bool(np.abs(motion).max() < 1e6),
+        finite=bool(np.abs(motion).max() < LOST),
     )

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
-from typing import Final, Literal
+from typing import Any, Final
 
 import numpy as np
 
 from roller_env.compile.compiled import CompiledLevel, compile_level
+from roller_env.lab.simulate import Float64
 from roller_env.lab.stability.cases import Effort
 from roller_env.lab.stability.failures import (
     GATE_SPEED_M_S,
@@ -25,7 +26,7 @@ from roller_env.lab.stability.failures import (
     seam_level,
     skid_level,
 )
-from roller_env.lab.stability.game import GROUND, Course, Float64, Run, make_level, play
+from roller_env.lab.stability.game import GROUND, Course, Run, make_level, play
 from roller_env.level import Level, load_level
 from roller_env.physics.presets import PRESETS, PhysicsPreset
 from roller_env.units import quants
@@ -88,22 +89,6 @@ class HardCase:
     runs: Callable[[PhysicsPreset, int], list[Run]]
     read: Callable[[Sequence[Run], PhysicsPreset], Iterator[Reading]]
     note: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class HardRow:
-    """One quantity of one case under one preset; the fields are `HardCase`'s and `Reading`'s."""
-
-    case: str
-    preset: str
-    title: str
-    quantity: str
-    value: float
-    limit: float
-    verdict: Literal["holds", "fails"]
-    reason: str
-    starts: int
-    note: str
 
 
 # What is read off ----------------------------------------------------------------------------
@@ -431,26 +416,29 @@ HARD_CASES: Final[dict[str, HardCase]] = {
 """By name."""
 
 
-def run_case(case: HardCase, presets: Iterable[PhysicsPreset], effort: Effort) -> list[HardRow]:
-    """Return the case's rows under each preset."""
-    return [row for preset in presets for row in _rows(case, preset, effort.starts)]
+def run_case(
+    case: HardCase, presets: Iterable[PhysicsPreset], effort: Effort
+) -> list[dict[str, Any]]:
+    """Return the case's rows under each preset.
 
-
-def _rows(case: HardCase, preset: PhysicsPreset, starts: int) -> Iterator[HardRow]:
-    runs = case.runs(preset, starts)
-    for reading in case.read(runs, preset):
-        yield HardRow(
-            case=case.name,
-            preset=preset.name,
-            title=case.title,
-            quantity=reading.quantity,
-            value=reading.value,
-            limit=reading.limit,
-            verdict="holds" if reading.value <= reading.limit else "fails",
-            reason=reading.reason,
-            starts=len(runs),
-            note=case.note,
-        )
+    Returns:
+        ``case``, ``preset``, ``title``, and of each `Reading` the ``quantity``, ``value``,
+        ``limit``, ``reason`` and ``verdict`` (holds or fails); ``starts`` and the ``note``.
+    """
+    rows = []
+    for preset in presets:
+        runs = case.runs(preset, effort.starts)
+        rows += [
+            {"case": case.name, "preset": preset.name, "title": case.title}
+            | asdict(reading)
+            | {
+                "verdict": "holds" if reading.value <= reading.limit else "fails",
+                "starts": len(runs),
+                "note": case.note,
+            }
+            for reading in case.read(runs, preset)
+        ]
+    return rows
 
 
 ALL_PRESETS: Final = tuple(PRESETS.values())

@@ -13,6 +13,7 @@ from numpy.polynomial import Polynomial
 from scipy.optimize import brentq
 
 from roller_env.lab.methods import MujocoIntegrator, MujocoMethod
+from roller_env.lab.simulate import stays
 from roller_env.lab.stability.bisection import first_failure, locate
 from roller_env.lab.stability.cases import Case, Effort, Finding
 from roller_env.rigid_body import (
@@ -121,12 +122,7 @@ def stays_small(model: mujoco.MjModel, steps: int) -> bool:
     """Say whether a motion that begins at `SMALL` never grows a million times."""
     data = mujoco.MjData(model)
     data.qpos[0] = SMALL
-    chunk = 8
-    for _ in range(steps // chunk):
-        mujoco.mj_step(model, data, chunk)
-        if not abs(data.qpos[0]) < 1e6 * SMALL:
-            return False
-    return True
+    return stays(model, data, steps, lambda: bool(abs(data.qpos[0]) < 1e6 * SMALL))
 
 
 def _servo_holds(
@@ -201,11 +197,8 @@ def _mujoco_drag_holds(method: MujocoMethod, eulerdamp: bool, steps: int, phase:
     model = spec.compile()
     data = mujoco.MjData(model)
     data.qvel[0] = SMALL
-    for _ in range(steps // 8):
-        mujoco.mj_step(model, data, 8)
-        if not abs(data.qvel[0]) <= 1e3 * SMALL:
-            return False
-    return abs(float(data.qvel[0])) <= SMALL
+    small = stays(model, data, steps, lambda: bool(abs(data.qvel[0]) <= 1e3 * SMALL))
+    return small and abs(float(data.qvel[0])) <= SMALL
 
 
 def drag_limit(method: Integrator) -> float:
