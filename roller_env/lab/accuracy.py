@@ -8,6 +8,7 @@ which the time step is halved, the table of orders.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -24,7 +25,7 @@ from roller_env.lab.contact import CONTACT_SCENES
 from roller_env.lab.free import COMPLEX_BOX, FREE_SCENES, FreeScene, free_model
 from roller_env.lab.methods import MUJOCO, RIGID_BODY, Method, RigidBodyMethod
 from roller_env.lab.orders import EXACT, HORIZON_S, Order, measured_orders
-from roller_env.lab.runner import REPEATS, header, known, provenance, wall_time
+from roller_env.lab.runner import REPEATS, Median, header, interleaved, known, provenance, timed
 from roller_env.lab.scene import ERROR_KINDS, ErrorKind, Measure, Scene, measure
 from roller_env.lab.table import Frame, markdown
 from roller_env.rigid_body import advance
@@ -55,7 +56,7 @@ class Effort:
 
 
 FULL: Final = Effort(quick=False, repeats=REPEATS, rigid_body_evaluations=2_000_000)
-QUICK: Final = Effort(quick=True, repeats=3, rigid_body_evaluations=400, time_steps=3)
+QUICK: Final = Effort(quick=True, repeats=3, rigid_body_evaluations=40_000, time_steps=3)
 
 QUICK_SCENES: Final = ("complex-box", "asymmetric-top", "damped-spin", "drag", "push")
 """What a quick run does unless told otherwise: the scenes that the table of orders needs."""
@@ -107,7 +108,7 @@ TIE: Final = 0.15
 """Costs within this of the cheapest count as the same: a shared machine's clock knows no better."""
 
 COST_COLUMN: Final[dict[Cost, str]] = {
-    "wall time": "wall_s_per_s",
+    "CPU time": "cpu_s_per_s",
     "force evaluations": "evaluations_per_s",
 }
 
@@ -174,7 +175,7 @@ def _best(best: Frame, every: Frame, column: str) -> dict[str, Any]:
     return {
         "dt_s": first.dt_s,
         "error": first.error,
-        "times_real_time": 1.0 / first.wall_s_per_s,
+        "times_real_time": 1.0 / first.cpu_s_per_s,
         "evaluations_per_s": first.evaluations_per_s,
         "method": first.method,
         "also": ", ".join(ties.method),
@@ -217,33 +218,43 @@ BATCHES: Final = (1, 1000)
 
 
 def step_costs(repeats: int) -> Frame:
-    """Return what a step of every method costs a body on the thrown box: method, bodies, us."""
+    """Return the CPU time of a step of every method on the thrown box, in interleaved runs.
+
+    Returns:
+        ``method``, ``bodies`` that advance in one call, ``us_per_body_step`` (median) and
+        ``us_per_body_evaluation``.
+    """
     start, acting, dt_s = COMPLEX_BOX.start, COMPLEX_BOX.acting, 1e-3
-    rows = []
+    runs: dict[str, Callable[[], object]] = {}
+    cases: dict[str, tuple[Method, int, int]] = {}
     for method in MUJOCO:
         model = free_model(start.body, method, dt_s)
         data = mujoco.MjData(model)
         acting.apply(model, data)
-        wall = wall_time(partial(mujoco.mj_step, model, data, 2000), repeats)
-        rows.append(_step_cost(method, 1, wall.value / 2000))
+        runs[method.name] = partial(mujoco.mj_step, model, data, 2000)
+        cases[method.name] = (method, 1, 2000)
     for ours in RIGID_BODY:
         for bodies in BATCHES:
-            batch, load, steps = start.take([0] * bodies), acting.load(), 20_000 // bodies
-            run = partial(advance, batch, ours.integrator, dt_s, steps, load=load)
-            wall = wall_time(run, repeats)
-            rows.append(_step_cost(ours, bodies, wall.value / (steps * bodies)))
+            name, steps, batch = f"{ours.name} {bodies}", 20_000 // bodies, start.take([0] * bodies)
+            load = acting.load()
+            runs[name] = partial(advance, batch, ours.integrator, dt_s, steps, load=load)
+            cases[name] = (ours, bodies, steps)
+    for run in runs.values():
+        run()
+    turns = {name: partial(timed, run, time.thread_time) for name, run in runs.items()}
+    taken = interleaved(turns, repeats)
+    rows = []
+    for name, (case, bodies, steps) in cases.items():
+        us = 1e6 * Median.of(taken[name]).value / (steps * bodies)
+        rows.append(
+            {
+                "method": case.name,
+                "bodies": bodies,
+                "us_per_body_step": us,
+                "us_per_body_evaluation": us / case.evaluations,
+            }
+        )
     return table.frame(rows)
-
-
-def _step_cost(method: Method, bodies: int, seconds: float) -> dict[str, Any]:
-    us = 1e6 * seconds
-    per_evaluation = us / method.evaluations
-    return {
-        "method": method.name,
-        "bodies": bodies,
-        "us_per_body_step": us,
-        "us_per_body_evaluation": per_evaluation,
-    }
 
 
 def draw_step_costs(costs: Frame) -> Any:
@@ -263,7 +274,7 @@ def draw_step_costs(costs: Frame) -> Any:
         "What a step of a free body costs",
         "On the thrown box, one thread. The line is MuJoCo's RK4; at the right how many steps of "
         "each are done while it does one.",
-        "µs a step of a body",
+        "CPU µs a step of a body",
         (0.05, 100.0),
         limit=theirs,
         label_in=3.2,
@@ -489,7 +500,7 @@ def cheapest_section(results: Results) -> str:
         names = ["", ""] if said == (scene, error) else [scene, labels[scene, error]]
         said = scene, error
         rows.append([*names, f"{tolerance:.0e}", *(_answer(one) for one in own.itertuples())])
-    titles = ["scene", "error", "at most", "least wall time", "fewest evaluations of the forces"]
+    titles = ["scene", "error", "at most", "least CPU time", "fewest evaluations of the forces"]
     return markdown(titles, rows) if rows else ""
 
 
@@ -498,7 +509,7 @@ def _answer(answer: Any) -> str:
         return "none that was tried"
     price = (
         f"{answer.times_real_time:,.0f} times real time"
-        if answer.cost == "wall time"
+        if answer.cost == "CPU time"
         else f"{answer.evaluations_per_s:,.0f} a second"
     )
     also = f"; as cheap: {answer.also}" if answer.also else ""

@@ -241,18 +241,18 @@ def label(axes: Axes, names: Iterable[tuple[str, float, float, str]], **style: A
 
 # --- error against cost ----------------------------------------------------------------------
 
-Cost = Literal["wall time", "force evaluations"]
-COSTS: Final[tuple[Cost, ...]] = ("wall time", "force evaluations")
+Cost = Literal["CPU time", "force evaluations"]
+COSTS: Final[tuple[Cost, ...]] = ("CPU time", "force evaluations")
 
 ROUNDING: Final = 1e-13
 """Errors below it are rounding of float64: the answer is exact."""
 
 _COST_COLUMN: Final[dict[Cost, str]] = {
-    "wall time": "wall_s_per_s",
+    "CPU time": "cpu_s_per_s",
     "force evaluations": "evaluations_per_s",
 }
 _COST_LABELS: Final[dict[Cost, str]] = {
-    "wall time": "wall seconds for a simulated second",
+    "CPU time": "CPU seconds for a simulated second",
     "force evaluations": "evaluations of the forces for a simulated second",
 }
 _KINDS: Final[dict[ErrorKind, str]] = {
@@ -311,17 +311,17 @@ def draw_scene(plot: Plot) -> Figure:
 
 
 def draw_overview(plots: Sequence[Plot], columns: int = 3) -> Figure:
-    """Draw the errors of several scenes against wall time, a panel each."""
+    """Draw the errors of several scenes against CPU time, a panel each."""
     columns = min(columns, len(plots))
     lines = math.ceil(len(plots) / columns)
     figure, panels = grid((lines, columns), "Error against cost", f"{_KINDS[plots[0].kind]} Lower "
                           "left is better.", margins=(0.9, 2.7, 1.2, 0.8))  # fmt: skip
     with matplotlib.rc_context(STYLE):
         for axes, plot in zip(panels.ravel(), plots, strict=False):
-            _draw_panel(axes, plot, "wall time")
+            _draw_panel(axes, plot, "CPU time")
             axes.set_title(textwrap.fill(plot.title, 46), fontsize=10, weight="bold", loc="left")
             axes.set_ylabel(plot.label, fontsize=8)
-            axes.set_xlabel(_COST_LABELS["wall time"], fontsize=8)
+            axes.set_xlabel(_COST_LABELS["CPU time"], fontsize=8)
         for axes in panels.ravel()[len(plots) :]:
             axes.set_axis_off()
         figure.legend(handles=_legend(plots), loc="center right", fontsize=9)

@@ -22,6 +22,7 @@ from pandas import concat
 
 from roller_env.lab import chart
 from roller_env.lab.free import Acting, FreeScene, Truth, Vector, in_rows
+from roller_env.lab.game import GRAVITY_M_S2, LIFT_N, LIFT_S
 from roller_env.lab.methods import Method, MujocoMethod, RigidBodyMethod
 from roller_env.lab.runner import known
 from roller_env.lab.table import Frame, frame, markdown
@@ -40,7 +41,6 @@ from roller_env.rigid_body import (
     quaternion,
 )
 from roller_env.rigid_body.arrays import Float64, positive_time
-from roller_env.units import quants
 
 AGREEMENT: Final = 1e-9
 """The two sides agree when position, m, and attitude, rad, stay within this of one another."""
@@ -54,12 +54,8 @@ MOMENTS: Final = 100
 
 # --- what is flown ---------------------------------------------------------------------------
 
-GRAVITY_M_S2: Final[Vector] = (0.0, 0.0, -quants(386.0))
-"""The original's."""
+WEIGHT_M_S2: Final[Vector] = (0.0, 0.0, -GRAVITY_M_S2)
 
-LIFT_N: Final = quants(500.0)
-"""The original's lift pad on its ball of 1 kg, in force for `LIFT_S`."""
-LIFT_S: Final = 5.0
 
 START_ORIENTATION: Final = (0.8, 0.2, -0.4, 0.4)
 """A unit quaternion with no special direction, so that no axis hides another."""
@@ -114,25 +110,25 @@ FLIGHTS: Final[Mapping[str, Flight]] = {
         "thrown, spun about the box's middle axis",
         (-2.0, 2.0, 8.0),
         (0.1, 5.0, 0.1),
-        Acting(GRAVITY_M_S2),
+        Acting(WEIGHT_M_S2),
     ),
     "keys": Flight(
         "WASD key sequence in free fall",
         (0.0, 0.0, 5.0),
         (2.0, 3.0, -4.0),
-        Acting(GRAVITY_M_S2, held=key_sequence(KEYS_HELD)),
+        Acting(WEIGHT_M_S2, held=key_sequence(KEYS_HELD)),
     ),
     "lift": Flight(
         "lift of 12.7 N for 5 s",
         (0.5, 0.0, 0.0),
         (-3.0, 1.0, 5.0),
-        Acting(GRAVITY_M_S2, held=_LIFT),
+        Acting(WEIGHT_M_S2, held=_LIFT),
     ),
     "damping": Flight(
         "linear and angular damping",
         (5.0, -3.0, 10.0),
         (4.0, -4.0, 3.0),
-        Acting(GRAVITY_M_S2, drag_n_s_m=0.5, spin_damping_nm_s=0.05),
+        Acting(WEIGHT_M_S2, drag_n_s_m=0.5, spin_damping_nm_s=0.05),
     ),
     "torque": Flight(
         "the report's torque, (1, 0, 0) - 0.1 omega",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal, Protocol, runtime_checkable
 
 from roller_env.lab.methods import Method, without_warnings
-from roller_env.lab.runner import wall_time
+from roller_env.lab.runner import cpu_time
 
 ErrorKind = Literal["discretisation", "model"]
 ERROR_KINDS: Final[tuple[ErrorKind, ...]] = ("discretisation", "model")
@@ -108,16 +108,16 @@ def measure(scene: Scene, method: Method, dt_s: float, repeats: int) -> list[dic
 
     Returns:
         Rows of ``scene``, ``method``, ``measure``, ``kind``, ``dt_s``, ``error``, ``failed``,
-        ``wall_s_per_s`` and ``evaluations_per_s`` (median wall seconds, and evaluations of the
-        forces, for a simulated second) and ``wall_spread``.
+        ``cpu_s_per_s`` and ``evaluations_per_s`` (median CPU seconds, and evaluations of the
+        forces, for a simulated second) and ``cpu_spread``.
     """
     trial = scene.trial(method, dt_s)
     with without_warnings():
         if isinstance(trial, SteadyTrial):
             trial.run()
-            wall, timed_s = wall_time(trial.run_part, repeats), trial.part_s
+            cpu, timed_s = cpu_time(trial.run_part, repeats), trial.part_s
         else:
-            wall, timed_s = wall_time(trial.run, repeats), scene.horizon_s
+            cpu, timed_s = cpu_time(trial.run, repeats), scene.horizon_s
     errors = trial.errors()
     failed = not errors[scene.measures[0].name] < scene.failure
     return [
@@ -129,8 +129,8 @@ def measure(scene: Scene, method: Method, dt_s: float, repeats: int) -> list[dic
             "dt_s": dt_s,
             "error": errors[one.name],
             "failed": failed,
-            "wall_s_per_s": wall.value / timed_s,
-            "wall_spread": wall.spread,
+            "cpu_s_per_s": cpu.value / timed_s,
+            "cpu_spread": cpu.spread,
             "evaluations_per_s": method.evaluations / dt_s,
         }
         for one in scene.measures

@@ -48,8 +48,8 @@ def point(method: str, dt_s: float, error: float, wall: float, *, failed: bool =
         "dt_s": dt_s,
         "error": error,
         "failed": failed,
-        "wall_s_per_s": wall,
-        "wall_spread": 0.1,
+        "cpu_s_per_s": wall,
+        "cpu_spread": 0.1,
         "evaluations_per_s": 1.0 / dt_s,
     }
 
@@ -69,7 +69,7 @@ def test_the_cheapest_method_depends_on_the_error_that_is_allowed() -> None:
     by_wall = {
         one.tolerance: one
         for one in rows(cheapest(frame([*SLOW_AND_GOOD, *FAST_AND_BAD])))
-        if one.cost == "wall time"
+        if one.cost == "CPU time"
     }
     assert (by_wall[1e-3].method, by_wall[1e-3].dt_s) == ("bad", 0.01)
     assert (by_wall[1e-6].method, by_wall[1e-6].dt_s) == ("good", 0.01)
@@ -79,7 +79,7 @@ def test_the_cheapest_method_depends_on_the_error_that_is_allowed() -> None:
 
 def test_a_cost_that_no_clock_can_tell_apart_is_a_tie() -> None:
     twin = [
-        one | {"method": "twin", "wall_s_per_s": 1.1 * one["wall_s_per_s"]} for one in FAST_AND_BAD
+        one | {"method": "twin", "cpu_s_per_s": 1.1 * one["cpu_s_per_s"]} for one in FAST_AND_BAD
     ]
     found = rows(cheapest(frame([*FAST_AND_BAD, *twin])))
     assert {one.also for one in found if one.tolerance == 1e-3} == {"twin"}
@@ -106,7 +106,7 @@ def test_a_step_beyond_a_failing_one_is_luck() -> None:
     ]
     (found,) = rows(accurate_steps(frame(curve)))
     assert (found.largest_dt_s, found.first_failing_dt_s) == (0.1, 0.2)
-    assert pareto(frame(curve), "wall time").dt_s.tolist() == [0.1]
+    assert pareto(frame(curve), "CPU time").dt_s.tolist() == [0.1]
 
 
 def test_an_error_that_is_no_number_is_a_failure() -> None:
@@ -117,11 +117,11 @@ def test_an_error_that_is_no_number_is_a_failure() -> None:
 
 def test_nothing_on_the_pareto_front_is_beaten_and_everything_off_it_is() -> None:
     every = [*SLOW_AND_GOOD, *FAST_AND_BAD, point("worse", 0.1, 6e-2, 2e-4)]
-    front = pareto(frame(every), "wall time")
+    front = pareto(frame(every), "CPU time")
     assert front.method.tolist() == ["bad", "bad", "good", "good"]
     for number, one in enumerate(every):
         beaten = any(
-            other["error"] < one["error"] and other["wall_s_per_s"] < one["wall_s_per_s"]
+            other["error"] < one["error"] and other["cpu_s_per_s"] < one["cpu_s_per_s"]
             for other in every
         )
         assert beaten != (number in front.index)
@@ -129,7 +129,7 @@ def test_nothing_on_the_pareto_front_is_beaten_and_everything_off_it_is() -> Non
 
 def test_exact_is_exact_however_many_digits_more_a_dearer_step_has() -> None:
     exact = [point("one", 0.1, 5e-15, 1e-3), point("other", 0.1, 1e-16, 1e-2)]
-    assert pareto(frame(exact), "wall time").method.tolist() == ["one"]
+    assert pareto(frame(exact), "CPU time").method.tolist() == ["one"]
 
 
 # --- what is run -----------------------------------------------------------------------------

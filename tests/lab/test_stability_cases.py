@@ -11,11 +11,11 @@ import mujoco
 import pytest
 
 from roller_env.compile.compiled import compile_level
+from roller_env.lab.game import Course, play
 from roller_env.lab.stability import run
 from roller_env.lab.stability.cases import FULL, QUICK
 from roller_env.lab.stability.failure import rows, simulated
 from roller_env.lab.stability.failures import FAILURES, hanging_gate_level
-from roller_env.lab.stability.game import Course, play
 from roller_env.lab.stability.hard_cases import ALL_PRESETS, HARD_CASES, run_case
 from roller_env.lab.stability.run import CASES
 

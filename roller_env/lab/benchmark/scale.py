@@ -25,6 +25,7 @@ from roller_env.envs.vector import RollerVectorEnv
 from roller_env.lab import chart
 from roller_env.lab.benchmark.cases import SEED, VectorStep, check_options, random_actions
 from roller_env.lab.benchmark.ratios import NOT_MEASURED, Sense, goals_table, judge
+from roller_env.lab.game import RADIUS_M
 from roller_env.lab.runner import Config, Median, Result, compare, speed_ratio
 from roller_env.lab.table import Frame, frame, markdown
 from roller_env.level import Level
@@ -54,7 +55,7 @@ PITCH_M: Final = 3.0
 """Between the middles of neighbouring pillars: room for the ball of 0.81 m, and much to hit."""
 
 _ROWS, _COLUMNS = 6, 9
-_THICK_M, _WALL_M, _RADIUS_M = 0.5, 3.0, 0.4064
+_THICK_M, _WALL_M = 0.5, 3.0
 _MIDDLE: Final = 0.5 * (_ROWS - 1) * PITCH_M, 0.5 * (_COLUMNS - 1) * PITCH_M
 
 YARD_BOXES: Final = _ROWS * _COLUMNS + 5
@@ -92,7 +93,7 @@ def level_of_coins(coins: int) -> Level:
     if side * side != coins:
         raise ValueError(f"coins: found {coins}; must be a square number such as {side * side}")
     # Beside the lines on which the walls stand.
-    centre = (_MIDDLE[0] + 0.5, _MIDDLE[1] + 0.5, _RADIUS_M)
+    centre = (_MIDDLE[0] + 0.5, _MIDDLE[1] + 0.5, RADIUS_M)
     grid = {"centre": centre, "spacing": (1.0, 1.0), "count": (side, side)}
     return _level(f"coins-{coins}", boxes=_yard(), coins=[{"grid": grid}] if coins else [])
 
@@ -103,7 +104,7 @@ def _level(name: str, **pieces: Any) -> Level:
     return Level.model_validate(
         {
             "name": name,
-            "start": {"at": (x, y, _RADIUS_M), "jitter": (0.5, 0.5)},
+            "start": {"at": (x, y, RADIUS_M), "jitter": (0.5, 0.5)},
             "finish": {"at": (x, y, 100.0), "size": (1.0, 1.0, 1.0)},
             "time_limit_s": 20.0,
             **pieces,

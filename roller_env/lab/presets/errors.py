@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
-import mujoco
 import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
@@ -16,24 +15,31 @@ from mujoco.batch import Batch
 from roller_env.compile.compiled import CompiledLevel
 from roller_env.config import EnvConfig
 from roller_env.game.actions import forces, held_keys
+from roller_env.lab.game import (
+    DECK_M,
+    FRICTION,
+    GATE_SPEED_M_S,
+    GRAVITY_M_S2,
+    LIFT_N,
+    LIFT_S,
+    RADIUS_M,
+    THROUGH_M,
+    TUBE_FALL_M,
+    Course,
+    make_level,
+    play,
+    played,
+)
 from roller_env.lab.presets.setting import Setting
-from roller_env.lab.stability.failures import GATE_SPEED_M_S, hanging_gate_level, seam_level
-from roller_env.lab.stability.game import Course, make_level, play
+from roller_env.lab.stability.failures import hanging_gate_level, seam_level
 from roller_env.level import Level, load_level
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.physics.stepper import keeps_poses
-from roller_env.simulation import Simulation
 from roller_env.units import quants
 
 Float64 = npt.NDArray[np.float64]
 
-RADIUS_M: Final = quants(16.0)
 LANE_M: Final = 80.0
-GRAVITY_M_S2: Final = quants(386.0)
-FRICTION: Final = 0.3
-DECK_M: Final = quants(16.0)
-LIFT_N: Final = quants(500.0)
-LIFT_S: Final = 5.0
 LOST_M: Final = 1e4
 ROLLING: Final = 1.4
 """Inertia of a solid ball that rolls, over its mass."""
@@ -136,16 +142,12 @@ def driving(setting: Setting) -> dict[str, float]:
 
 # Landing -------------------------------------------------------------------------------------
 
-FALL_M: Final = 46.9
-"""The highest that a pad throws the ball over a deck."""
 FALL_S: Final = 4.0
 FASTEST_M_S: Final = 36.0
 """Of a ball that enters classic's tube as fast as it can, climbs its wall and flies 66 m up."""
 ARRIVALS: Final = np.linspace(0.02, 0.98, 12)
 """Shares of a step after which a ball touches the ground."""
 TUNNEL_SPEEDS_M_S: Final = np.arange(10.0, 121.0, 5.0)
-THROUGH_M: Final = RADIUS_M + DECK_M / 2
-"""Deeper, the ball's centre is past the middle of the deck and it is pushed out below."""
 
 
 def landing(setting: Setting) -> dict[str, float]:
@@ -155,7 +157,7 @@ def landing(setting: Setting) -> dict[str, float]:
     falling = World(setting, level, len(ARRIVALS), FALL_S)
     falling.position[:, :2] = 0.0
     # 0.5 m of height are one step of 1/60 s at 30 m/s.
-    falling.position[:, 2] = RADIUS_M + FALL_M + 0.5 * ARRIVALS
+    falling.position[:, 2] = RADIUS_M + TUBE_FALL_M + 0.5 * ARRIVALS
     fallen = _depth(falling.path())
     speeds = np.array([FASTEST_M_S, *TUNNEL_SPEEDS_M_S])
     speed, arrival = (a.ravel() for a in np.meshgrid(speeds, ARRIVALS, indexing="ij"))
@@ -362,40 +364,11 @@ REFERENCE_HZ: Final = 7680
 both 4e-4 of the way from it. Contacts go with the step and approach a rigid ball's."""
 
 
-@dataclass(frozen=True, slots=True)
-class Recording:
-    """A game that was played once with the rules, to be repeated without them.
-
-    Attributes:
-        start: (3,) of the ball, m.
-        ctrl: (steps, nu) what the actuators did, held for `CONTROL_DT_S` each.
-    """
-
-    start: Float64
-    ctrl: Float64
-
-
 @cache
-def recordings() -> tuple[Recording, ...]:
-    """Play `COURSES` on the classic level with the product's own rules and ``accurate`` physics."""
+def recordings() -> tuple[tuple[Float64, Float64], ...]:
+    """Play `COURSES` on the classic level with ``accurate`` physics; see `played`."""
     config = EnvConfig(level="classic", physics="accurate", control_dt_s=CONTROL_DT_S)
-    return tuple(_record(config, keys, seed) for seed, keys in enumerate(COURSES))
-
-
-def _record(config: EnvConfig, keys: Sequence[tuple[str, float]], seed: int) -> Recording:
-    simulation = Simulation(config)
-    simulation.seed([np.random.default_rng(seed)])
-    simulation.reset()
-    model = simulation.compiled.model
-    data = mujoco.MjData(model)
-    start, ctrl = simulation.ball_position[0], []
-    for held, seconds in keys:
-        for _ in range(round(seconds / CONTROL_DT_S)):
-            simulation.step(forces("keys", held_keys(held)[None]))
-            state: Float64 = simulation.snapshot().physics[0]
-            mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
-            ctrl.append(data.ctrl.copy())
-    return Recording(start, np.array(ctrl))
+    return tuple(played(config, keys, seed) for seed, keys in enumerate(COURSES))
 
 
 def course(setting: Setting, reference_hz: int = REFERENCE_HZ) -> dict[str, float]:
@@ -413,12 +386,12 @@ def course(setting: Setting, reference_hz: int = REFERENCE_HZ) -> dict[str, floa
 
 def course_paths(setting: Setting) -> Float64:
     """Return where the ball is after every control step, (courses, steps + 1, 3) m."""
-    played = recordings()
-    world = World(setting, load_level("classic"), len(played), CONTROL_DT_S)
-    world.position[:] = [one.start for one in played]
+    starts, controls = zip(*recordings(), strict=True)
+    world = World(setting, load_level("classic"), len(starts), CONTROL_DT_S)
+    world.position[:] = starts
     places = [world.position.copy()]
-    for step in range(len(played[0].ctrl)):
-        world.ctrl[:] = [one.ctrl[step] for one in played]
+    for ctrl in zip(*controls, strict=True):
+        world.ctrl[:] = ctrl
         places.append(world.path()[:, -1])
     return np.stack(places, axis=1)
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.compile.mjcf import SERVO_G, build_spec
+from roller_env.lab.game import GATE_SPEED_M_S, Course, make_level
 from roller_env.lab.methods import MujocoMethod
 from roller_env.lab.simulate import Float64, Path
 from roller_env.lab.stability.failure import Failure, Setting
-from roller_env.lab.stability.game import Course, make_level
 from roller_env.lab.stability.scenes import (
     RADIUS_M,
     SETTLE_S,
@@ -33,8 +33,6 @@ from roller_env.units import quants
 
 DEFAULT: Final = PRESETS["default"]
 FAST: Final = PRESETS["fast"]
-GATE_SPEED_M_S: Final = quants(32.0)
-"""The original's gates."""
 
 
 def without_force_limits(compiled: CompiledLevel) -> CompiledLevel:

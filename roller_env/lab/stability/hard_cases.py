@@ -16,37 +16,35 @@ from typing import Any, Final
 import numpy as np
 
 from roller_env.compile.compiled import CompiledLevel, compile_level
+from roller_env.game.actions import KEY_FORCE_N
+from roller_env.lab.game import (
+    DECK_M,
+    GATE_SPEED_M_S,
+    GROUND,
+    PLATE_SPEED_M_S,
+    RADIUS_M,
+    THROUGH_M,
+    TUBE_FALL_M,
+    Course,
+    Run,
+    make_level,
+    play,
+)
 from roller_env.lab.simulate import Float64
 from roller_env.lab.stability.cases import Effort
 from roller_env.lab.stability.failures import (
-    GATE_SPEED_M_S,
     VISIBLE_HOP,
     VISIBLE_HOP_MM,
     hanging_gate_level,
     seam_level,
     skid_level,
 )
-from roller_env.lab.stability.game import GROUND, Course, Run, make_level, play
 from roller_env.level import Level, load_level
 from roller_env.physics.presets import PRESETS, PhysicsPreset
 from roller_env.units import quants
 
-RADIUS_M: Final = quants(16.0)
-"""The original's ball."""
-
-KEY_N: Final = quants(200.0)
-PLATE_SPEED_M_S: Final = quants(1.6)
-DECK_M: Final = quants(16.0)
-"""Thickness of the original's decks."""
-
-TUBE_FALL_M: Final = 46.9
-"""The highest that a pad and a tube of the classic level throw the ball over a deck."""
-
 FULL_SPEED_M_S: Final = 15.0
 """Two keys held over the classic's start deck of 22 m: sqrt(2 · 5.08 sqrt 2 / 1.4 · 22)."""
-
-THROUGH_M: Final = RADIUS_M + DECK_M / 2
-"""A ball this deep in a deck has its centre past the middle and is pushed out below."""
 
 LOOKS_LIKE_CONTACT_M: Final = RADIUS_M / 10
 _THROUGH: Final = "deeper, the ball's centre is past the middle of a deck and it falls through"
@@ -165,7 +163,7 @@ def _pressed_to_the_gate(preset: PhysicsPreset, starts: int) -> list[Run]:
             Course(
                 compiled,
                 (face, float(y), floor),
-                force_n=(KEY_N, 0.0, 0.0),
+                force_n=(KEY_FORCE_N, 0.0, 0.0),
                 movers_m_s=-GATE_SPEED_M_S,
             ),
             3.0,
@@ -203,7 +201,7 @@ def _wedged(preset: PhysicsPreset, starts: int) -> list[Run]:
                 compiled,
                 (2.6, -1.09 + RADIUS_M, RADIUS_M),
                 velocity=(-float(speed), 0.0, 0.0),
-                force_n=(-KEY_N, 0.0, 0.0),
+                force_n=(-KEY_FORCE_N, 0.0, 0.0),
                 movers_m_s=-GATE_SPEED_M_S,
             )
             runs.append(play(course, 2.5))

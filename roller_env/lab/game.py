@@ -10,11 +10,37 @@ import mujoco
 import numpy as np
 
 from roller_env.compile.compiled import CompiledLevel
+from roller_env.config import EnvConfig
+from roller_env.game.actions import forces, held_keys
 from roller_env.lab.simulate import Float64, record, started
 from roller_env.level import Level, load_level
+from roller_env.simulation import Simulation
+from roller_env.units import quants
 
 LOST: Final = 1e6
 """No number of a ball in the game is so large, m, m/s or rad/s."""
+
+RADIUS_M: Final = quants(16.0)
+MASS_KG: Final = 1.0
+GRAVITY_M_S2: Final = quants(386.0)
+FRICTION: Final = 0.3
+"""The game's ball, gravity and friction: docs of the original, in `roller_env.level.schema`."""
+
+DECK_M: Final = quants(16.0)
+"""Thickness of the original's decks."""
+THROUGH_M: Final = RADIUS_M + DECK_M / 2
+"""A ball this deep in a deck has its centre past the middle and is pushed out below."""
+
+GATE_SPEED_M_S: Final = quants(32.0)
+PLATE_SPEED_M_S: Final = quants(1.6)
+"""The original's gates and plates."""
+
+LIFT_N: Final = quants(500.0)
+LIFT_S: Final = 5.0
+"""The original's lift pad on its ball, and for how long."""
+
+TUBE_FALL_M: Final = 46.9
+"""The highest that a pad and a tube of the classic level throw the ball over a deck."""
 
 GROUND: Final[Mapping[str, Any]] = {"at": (0.0, 0.0, -2.0), "size": (400.0, 400.0, 4.0)}
 """A wide thick floor with its upper face at z = 0."""
@@ -24,7 +50,7 @@ def make_level(**pieces: Any) -> Level:
     """Return a checked level of ``pieces``, on wide ground unless they say otherwise."""
     plain: dict[str, Any] = {
         "name": "experiment",
-        "start": {"at": (-150.0, -150.0, 0.4064)},
+        "start": {"at": (-150.0, -150.0, RADIUS_M)},
         "finish": {"at": (190.0, 190.0, 0.5), "size": (1.0, 1.0, 1.0)},
         "boxes": [dict(GROUND)],
     }
@@ -128,3 +154,34 @@ def play(course: Course, seconds: float) -> Run:
         depth=depth,
         finite=bool(np.abs(motion).max() < LOST),
     )
+
+
+def played(
+    config: EnvConfig, keys: Sequence[tuple[str, float]], seed: int
+) -> tuple[Float64, Float64]:
+    """Play keys through the product's own simulation, rules and all.
+
+    Args:
+        config: of the game.
+        keys: of ``wasd``, and for how many seconds each are held.
+        seed: by which the ball's place at the start is drawn.
+
+    Returns:
+        Where the ball began, (3,) m, and what the actuators did in each control step, (steps, nu),
+        so that it can be repeated open loop: events that are quantised to control steps then fall
+        alike with every method.
+    """
+    simulation = Simulation(config)
+    simulation.seed([np.random.default_rng(seed)])
+    simulation.reset()
+    model = simulation.compiled.model
+    data = mujoco.MjData(model)
+    start, ctrl = simulation.ball_position[0].copy(), []
+    for held, seconds in keys:
+        force = forces("keys", held_keys(held)[None])
+        for _ in range(round(seconds / config.control_dt_s)):
+            simulation.step(force)
+            state: Float64 = simulation.snapshot().physics[0]
+            mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+            ctrl.append(data.ctrl.copy())
+    return start, np.array(ctrl)
