@@ -55,7 +55,7 @@ class Effort:
     time_steps: int | None = None
 
 
-FULL: Final = Effort(quick=False, repeats=REPEATS, rigid_body_evaluations=2_000_000)
+FULL: Final = Effort(quick=False, repeats=REPEATS, rigid_body_evaluations=400_000)
 QUICK: Final = Effort(quick=True, repeats=3, rigid_body_evaluations=40_000, time_steps=3)
 
 QUICK_SCENES: Final = ("complex-box", "asymmetric-top", "damped-spin", "drag", "push")
