@@ -241,9 +241,9 @@ def test_coins_are_counted_over_the_whole_level_without_making_them() -> None:
     grid = {"grid": {"centre": (0, 0, 5), "spacing": (1, 1), "count": (100, 100)}}
     assert faults(coins=[grid]) == []
     assert faults(coins=[grid, {"at": (0, 0, 9)}]) == [("coins",)]
-    began = time.perf_counter()
+    began = time.process_time()
     assert faults(coins=[grid] * 5_000) == [("coins",)]
-    assert time.perf_counter() - began < 5.0
+    assert time.process_time() - began < 5.0
 
 
 def test_pieces_are_counted_over_the_whole_level() -> None:
@@ -262,9 +262,9 @@ def test_ten_thousand_coins_and_a_thousand_turned_boxes_take_about_a_second() ->
     grid = {"centre": (0, 0, 300.0), "spacing": (1, 1), "count": (99, 99)}
     level = small_level(boxes=[*_floor(), *boxes], coins=[*coins, {"grid": grid}])
     assert 9_000 < 99 * 99 + len(coins) <= MAX_COINS
-    began = time.perf_counter()
+    began = time.process_time()
     found = [problem.path for problem in check_level(level)]
-    assert time.perf_counter() - began < 5.0
+    assert time.process_time() - began < 5.0
     assert found == [("coins", index) for index in range(10)]
 
 
