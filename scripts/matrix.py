@@ -149,14 +149,20 @@ def _set_up_and_test(case: Case, wheel: Path) -> tuple[str, str]:
     return versions, run(*pytest, *TESTS, directory=case.directory).splitlines()[-1]
 
 
+def build_wheel(directory: Path) -> Path:
+    """Build the package's wheel into a directory and return its path."""
+    build = (sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation")
+    run(*build, "--wheel-dir", directory, ROOT, directory=ROOT)
+    (wheel,) = directory.glob("*.whl")
+    return wheel
+
+
 def main() -> int:
     """Try every case, as many at once as there are processors; return the exit status."""
     made, absent = cases()
     MATRIX.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as directory:
-        build = (sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps")
-        run(*build, "--no-build-isolation", "-w", directory, ROOT, directory=ROOT)
-        (wheel,) = Path(directory).glob("*.whl")
+        wheel = build_wheel(Path(directory))
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             results = list(pool.map(lambda case: attempt(case, wheel), made))
     for _, report in results:
