@@ -76,13 +76,14 @@ def oldest_gymnasium(project: dict[str, list[str]]) -> str:
 def find_python(version: str) -> str | None:
     """Return a Python of this version that can make environments, or None."""
     pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
-    candidates = [*sorted(pyenv.glob(f"{version}.*/bin/python")), shutil.which(f"python{version}")]
-    for candidate in filter(None, candidates):
+    candidates = [str(path) for path in sorted(pyenv.glob(f"{version}.*/bin/python"))]
+    on_the_path = shutil.which(f"python{version}")
+    for candidate in candidates if on_the_path is None else [*candidates, on_the_path]:
         # One of pyenv's doors may be there without anything behind it.
         code = "import ensurepip, sys, venv; print('%d.%d' % sys.version_info[:2])"
         said = subprocess.run([candidate, "-c", code], capture_output=True, text=True, check=False)
         if said.stdout.strip() == version:
-            return str(candidate)
+            return candidate
     return None
 
 
