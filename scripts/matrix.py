@@ -37,7 +37,7 @@ TESTS: Final = (
 SAY_VERSIONS: Final = """
 import platform
 from importlib.metadata import version
-print("Python", platform.python_version(), *(f"{n} {version(n)}" for n in
+print(f"Python {platform.python_version()}", *(f"{n} {version(n)}" for n in
       ("gymnasium", "mujoco", "numba", "numpy", "pydantic")), sep=", ")
 """
 
