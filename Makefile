@@ -13,11 +13,13 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 # Other environments, to be measured beside this one; never mixed with what Roller needs.
 PEERS  := .venv-peers
+# One environment for each supported Python.
+MATRIX := .venv-matrix
 # Newer than both files it depends on exactly when the environment is complete.
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup train play test lint format docs benchmark clean
+.PHONY: help setup train play test coverage matrix lint format docs benchmark clean
 .DELETE_ON_ERROR:
 
 help: ## show this list
@@ -53,6 +55,13 @@ play: $(READY) ## play in the browser, on this machine's port 8080
 test: $(READY) ## run the tests on all processors
 	@$(BIN)/python -m pytest --numprocesses auto --dist loadgroup $(ARGS)
 
+coverage: $(READY) ## run the tests, and say which lines of the package they leave out
+	@$(BIN)/python -m pytest --numprocesses auto --cov --cov-report term $(ARGS)
+	@echo "Loops that Numba compiles are not counted: coverage does not see machine code."
+
+matrix: $(READY) ## try the wheel with every supported Python found here, and the oldest Gymnasium
+	@$(BIN)/python scripts/matrix.py
+
 lint: $(READY) ## check style, types and the direction of imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -77,5 +86,5 @@ $(PEERS)/.ready: scripts/benchmark-peers.txt
 	@touch $@
 
 clean: ## remove the environments and caches; runs/ stays
-	rm -rf $(VENV) $(PEERS) build dist site .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(PEERS) $(MATRIX) build dist site .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -124,9 +124,9 @@ class Transition:
 class Simulation:
     """N independent games of one level, stepped together.
 
-    A step, in the order that the README calls the transition contract: physics; events along the
-    path; reward and termination for the task as it was when the step began; consequences.
-    `observe` then shows the new state.
+    A step, in the order of the transition contract (docs/rules.md): physics; events along the path;
+    reward and termination for the task as it was when the step began; consequences. `observe` then
+    shows the new state.
 
     Attributes:
         config: the options.

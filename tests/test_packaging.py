@@ -10,7 +10,9 @@ import zipfile
 from pathlib import Path
 
 import pytest
+import yaml
 
+import roller_env
 from roller_env.level import shipped_levels
 from roller_env.replay import shipped_replays
 
@@ -58,6 +60,13 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run(*pip, "--wheel-dir", directory, ROOT, directory=directory)
     (built,) = directory.glob("*.whl")
     return built
+
+
+def test_the_version_is_said_in_one_place(wheel: Path) -> None:
+    assert wheel.name.split("-")[1] == roller_env.__version__
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert cited["version"] == roller_env.__version__
+    assert [author["name"] for author in cited["authors"]] == ["Roller developers"]
 
 
 def test_the_wheel_holds_every_level_and_replay_and_says_that_it_is_typed(wheel: Path) -> None:

@@ -22,8 +22,8 @@ from roller_env.simulation import Simulation, Snapshot
 class RollerEnv(gym.Env[Any, Any]):
     """Roll a ball over a level with four keys: coins are points, the finish or a fall ends it.
 
-    The options are the keywords of `roller_env.config.EnvConfig`; the README has them in a table,
-    with the observation's entries and the order of events in a step.
+    The options are the keywords of `roller_env.config.EnvConfig`; docs/environments.md has them and
+    the observation's entries in tables, docs/rules.md the order of events in a step.
 
     The episode ends (``terminated``) at the finish, after a fall and when the physics diverges,
     and is cut off (``truncated``) at the level's time limit. Every ``info`` holds how the game

@@ -1,7 +1,7 @@
 """What an agent is shown, entry by entry.
 
-`STATE_ENTRIES` is the one list from which the layout, the Gymnasium spaces and the README's table
-are made.
+`STATE_ENTRIES` is the one list from which the layout, the Gymnasium spaces and the table of
+docs/environments.md are made.
 """
 
 from __future__ import annotations
@@ -415,7 +415,7 @@ def split(observation: Float32, parts: Sequence[Entry]) -> dict[str, Float32]:
 
 
 def markdown_table(parts: Iterable[Entry]) -> str:
-    """Return the entries as the table that the README shows."""
+    """Return the entries as the table that docs/environments.md shows."""
     lines = ["| index | name | meaning | unit | frame | range |", "|---|---|---|---|---|---|"]
     parts = tuple(parts)
     for entry, where in zip(parts, layout(parts).values(), strict=True):

@@ -41,7 +41,7 @@ def test_the_page_has_the_examples_that_the_tests_below_are_about() -> None:
 @pytest.mark.filterwarnings("ignore::roller_env.level.LevelWarning")  # most have no ground
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_every_example_loads(example: str) -> None:
-    assert parse_level(completed(example)).name in ("example", "hello")
+    assert parse_level(completed(example)).name in ("example", "hello", "hop")
 
 
 def test_the_first_example_is_a_whole_level() -> None:
