@@ -5,6 +5,8 @@ from __future__ import annotations
 from roller_env.level.check import check_level
 from roller_env.level.errors import LevelError
 from roller_env.level.load import (
+    examine_level,
+    is_path,
     level_json_schema,
     levels_directory,
     load_level,
@@ -19,6 +21,8 @@ __all__ = [
     "LevelError",
     "Problem",
     "check_level",
+    "examine_level",
+    "is_path",
     "level_json_schema",
     "levels_directory",
     "load_level",

@@ -18,8 +18,10 @@ from pydantic import ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema
 
+from roller_env.assets import asset_directory
 from roller_env.level.check import Unit, check_level
 from roller_env.level.errors import LevelError
+from roller_env.level.lint import lint
 from roller_env.level.messages import explain
 from roller_env.level.schema import METRES_PER_UNIT, SCALE_KEY, Level
 from roller_env.problems import Problem, listed, quoted
@@ -53,9 +55,30 @@ def load_level(source: str | os.PathLike[str] | Level | Mapping[str, Any]) -> Le
             return _level(_tree(lambda: plain_tree(source)), "", "")
         except LevelError as error:
             raise LevelError(map(_without_a_place, error.problems)) from None
-    is_name = isinstance(source, str) and not is_path(source)
-    path = _shipped_path(str(source)) if is_name else Path(source)
-    return _parse_bytes(_read(path), str(path))
+    path = _path_of(source)
+    return parse_level(_text_of(_read(path), str(path)), str(path))
+
+
+def examine_level(source: str | os.PathLike[str], dt_s: float) -> tuple[Level, tuple[Problem, ...]]:
+    """Load and check a level, and look for what a designer hardly meant.
+
+    Args:
+        source: the name of a shipped level, or a path, as for `load_level`.
+        dt_s: physics step of the preset that it is to be played with, seconds.
+
+    Returns:
+        The level, and the warnings in the order of the file; see `roller_env.level.lint`.
+
+    Raises:
+        LevelError: it cannot be played.
+    """
+    path = _path_of(source)
+    filename = str(path)
+    text = _text_of(_read(path), filename)
+    root = _tree(lambda: read_tree(text, filename))
+    level = _level(root, text, filename)
+    warnings = (_placed(found, root, filename) for found in lint(level, dt_s, _unit(root)))
+    return level, tuple(_in_file_order(warnings))
 
 
 def is_path(source: str) -> bool:
@@ -107,17 +130,10 @@ def shipped_levels() -> tuple[str, ...]:
 def levels_directory() -> Path:
     """Return the directory of the shipped levels.
 
-    It is inside the package in an installed wheel, and beside the package in a checkout.
-
     Raises:
         FileNotFoundError: the installation has lost it.
     """
-    package = Path(__file__).resolve().parents[1]
-    places = (package / "assets" / "levels", package.parent / "assets" / "levels")
-    for place in places:
-        if place.is_dir():
-            return place
-    raise FileNotFoundError(f"no directory of levels; looked for {listed([*map(str, places)])}")
+    return asset_directory("levels")
 
 
 class _EditorSchema(GenerateJsonSchema):
@@ -152,6 +168,11 @@ def _draft_07(schema: Any) -> Any:
     return said
 
 
+def _path_of(source: str | os.PathLike[str]) -> Path:
+    is_name = isinstance(source, str) and not is_path(source)
+    return _shipped_path(str(source)) if is_name else Path(source)
+
+
 def _shipped_path(name: str) -> Path:
     known = shipped_levels()
     if name not in known:
@@ -172,15 +193,14 @@ def _read(path: Path) -> bytes:
     raise LevelError([replace(problem, filename=str(path))])
 
 
-def _parse_bytes(data: bytes, filename: str) -> Level:
+def _text_of(data: bytes, filename: str) -> str:
     try:
-        text = data.decode("utf-8-sig")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         before = data[: error.start]
         line, column = before.count(b"\n") + 1, error.start - before.rfind(b"\n")
         message = f"found the byte 0x{data[error.start]:02x}, which is not UTF-8; save it as UTF-8"
         raise LevelError([Problem((), message, filename, line, column)]) from None
-    return parse_level(text, filename)
 
 
 def _unit(root: Node) -> Unit:
