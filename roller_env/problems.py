@@ -88,9 +88,14 @@ class ProblemsError(ValueError):
         super().__init__(self.problems)
 
     def __str__(self) -> str:
-        lines = [str(problem) for problem in self.problems[:MAX_PROBLEMS_PRINTED]]
-        more = len(self.problems) - len(lines)
-        return "\n".join([*lines, f"... and {more} more problems"] if more else lines)
+        return printed(self.problems)
+
+
+def printed(problems: Sequence[Problem]) -> str:
+    """Return the problems, one a line; of more than `MAX_PROBLEMS_PRINTED` the first."""
+    lines = [str(problem) for problem in problems[:MAX_PROBLEMS_PRINTED]]
+    more = len(problems) - len(lines)
+    return "\n".join([*lines, f"... and {more} more problems"] if more else lines)
 
 
 def field_name(path: FieldPath) -> str:

@@ -13,6 +13,7 @@ Examples::
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -21,6 +22,7 @@ from typing import Annotated, Final, Literal
 
 import tyro
 
+from roller_env.game.actions import KEY_FORCE_N
 from roller_env.level import (
     Level,
     LevelError,
@@ -30,6 +32,7 @@ from roller_env.level import (
     load_level,
     parse_level,
 )
+from roller_env.level.lint import Play
 from roller_env.level.template import new_level
 from roller_env.physics.presets import physics_preset
 from roller_env.problems import Problem, printable, shown
@@ -119,7 +122,7 @@ def check(
 def _report(source: str, physics: Preset) -> tuple[int, int]:
     """Print what is wrong with a level; return how many errors and warnings that were."""
     try:
-        _, warnings = examine_level(source, physics_preset(physics).dt_s)
+        _, warnings = examine_level(source, _play(physics))
     except LevelError as error:
         for problem in error.problems:
             print(_line(problem, "error"))
@@ -127,6 +130,11 @@ def _report(source: str, physics: Preset) -> tuple[int, int]:
     for problem in warnings:
         print(_line(problem, "warning"))
     return 0, len(warnings)
+
+
+def _play(physics: Preset) -> Play:
+    # The hardest push is that of two keys.
+    return Play(dt_s=physics_preset(physics).dt_s, push_n=math.hypot(KEY_FORCE_N, KEY_FORCE_N))
 
 
 def _line(problem: Problem, kind: str) -> str:
@@ -278,7 +286,7 @@ def look(file: Path, picture: Path, view: View, physics: Preset) -> None:
     """Check a level file and, if it can be played, draw it."""
     print(time.strftime("%H:%M:%S"), end=" ")
     try:
-        level, warnings = examine_level(file, physics_preset(physics).dt_s)
+        level, warnings = examine_level(file, _play(physics))
     except LevelError as error:
         print(_number(len(error.problems), "error"))
         print("\n".join(_line(problem, "error") for problem in error.problems), flush=True)

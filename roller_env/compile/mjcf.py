@@ -56,15 +56,20 @@ def build_spec(level: Level, preset: PhysicsPreset) -> mujoco.MjSpec:
     spec.modelname = level.name
     _set_options(spec, level, preset)
     _add_ball(spec, level)
-    for number, solid in enumerate(merge_solids(solids(level))):
-        _add_solid(spec, level, preset, solid, number)
+    merged = merge_solids(solids(level))
+    names = {solid.material for solid in merged}
+    contacts = {name: _contact(level, preset, level.material(name)) for name in names}
+    for number, solid in enumerate(merged):
+        _add_solid(spec, solid, contacts[solid.material], number)
     for pad_number, pad in enumerate(level.lift_pads):
         _add_lift_pad(spec, level, preset, pad, pad_number)
     for plate in level.plates:
         _add_mover(spec, level, preset, plate, plate.sinks_to, 0.0)
     for gate in level.gates:
         _add_mover(spec, level, preset, gate, gate.lowers_to, gate.yaw_deg)
-    if len(spec.geoms) <= MIDPHASE_GEOMS:
+    # The ball's, the solids', and one of each that stands or moves.
+    pieces = 1 + len(merged) + len(level.lift_pads) + len(level.plates) + len(level.gates)
+    if pieces <= MIDPHASE_GEOMS:
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     return spec
 
@@ -132,16 +137,14 @@ def _contact(level: Level, preset: PhysicsPreset, material: Material) -> dict[st
     }
 
 
-def _add_solid(
-    spec: mujoco.MjSpec, level: Level, preset: PhysicsPreset, solid: Solid, number: int
-) -> None:
+def _add_solid(spec: mujoco.MjSpec, solid: Solid, contact: dict[str, object], number: int) -> None:
     spec.worldbody.add_geom(
         name=f"solid_{number}_{solid.material}",
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=solid.half_size,
         pos=solid.centre,
         quat=_quaternion(np.array(solid.rotation)),
-        **_contact(level, preset, level.material(solid.material)),
+        **contact,
     )
 
 

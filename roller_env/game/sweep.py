@@ -53,7 +53,6 @@ class Events:
         coins: (N, K) coins collected.
         points: (N,) how many.
         plates: (N, P) plates struck.
-        pads: (N, A) lift pads fired.
         triggers: (N, T) camera triggers fired.
         finished: (N,) the finish was reached.
         fallen: (N,) the ball fell below the kill height.
@@ -65,7 +64,6 @@ class Events:
     coins: Bool
     points: Int64
     plates: Bool
-    pads: Bool
     triggers: Bool
     finished: Bool
     fallen: Bool
@@ -121,7 +119,6 @@ def find_events(state: GameState, table: LevelTable, motion: Motion) -> Events:
         coins=coins,
         points=points,
         plates=met[:, table.slices[Kind.PLATE]],
-        pads=met[:, table.slices[Kind.LIFT_PAD]],
         triggers=met[:, table.slices[Kind.TRIGGER]],
         finished=finished,
         fallen=fallen,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from roller_env.level.check import check_level
-from roller_env.level.errors import LevelError
+from roller_env.level.doubts import level_warnings
+from roller_env.level.errors import LevelError, LevelWarning
 from roller_env.level.load import (
     examine_level,
     is_path,
@@ -19,11 +20,13 @@ from roller_env.problems import Problem
 __all__ = [
     "Level",
     "LevelError",
+    "LevelWarning",
     "Problem",
     "check_level",
     "examine_level",
     "is_path",
     "level_json_schema",
+    "level_warnings",
     "levels_directory",
     "load_level",
     "parse_level",

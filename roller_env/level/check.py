@@ -9,37 +9,24 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from roller_env.level.expand import (
-    TOUCHING_M,
-    Float64,
-    Solid,
-    coin_positions,
-    rotation_matrix,
-    solids,
-)
+from roller_env.level.expand import TOUCHING_M, Float64, Solid, coin_positions, rotation_matrix
 from roller_env.level.schema import (
     BUILT_IN_MATERIALS,
     MAX_COINS,
     MAX_PIECES,
-    METRES_PER_UNIT,
     PLATE_HIT_HEIGHT_M,
     Coins,
     Gate,
     Level,
     Plate,
 )
+from roller_env.level.space import burying, inside, is_static, solids_at_the_start, starts
+from roller_env.level.words import InUnit, Unit, coin_groups
 from roller_env.problems import FieldPath, Problem, listed, quoted
-
-Unit = Literal["metre", "quant"]
-
-MAX_JITTER_SAMPLES: Final = 65
-"""Start positions tried along each axis of the jitter; corners and middle are always among them."""
 
 _PIECES_WITH_NAMES: Final = (
     *("floors", "boxes", "ramps", "walls", "tubes"),
@@ -57,7 +44,7 @@ def check_level(level: Level, unit: Unit = "metre") -> list[Problem]:
     Returns:
         The problems, without places in a file; empty for a level that can be played.
     """
-    in_unit = _InUnit(unit)
+    in_unit = InUnit(unit)
     too_many = list(_totals(level))
     problems = [
         *too_many,
@@ -70,12 +57,13 @@ def check_level(level: Level, unit: Unit = "metre") -> list[Problem]:
     ]
     if too_many:  # expanding them could take all memory
         return problems
-    everything = _solid_at_the_start(level)
+    everything = solids_at_the_start(level)
     return [
         *problems,
         *_tubes(level, everything),
         *_start(level, everything, in_unit),
-        *_coins(level, everything, in_unit),
+        *_finish(level, everything),
+        *_coins(level, in_unit),
     ]
 
 
@@ -84,7 +72,7 @@ def obstacles(level: Level) -> tuple[Solid, ...]:
     finish = level.finish
     x, y, z = (edge / 2 for edge in finish.size)
     block = Solid(finish.at, (x, y, z), rotation_matrix(0.0), "default", "the finish")
-    return (*_solid_at_the_start(level), block)
+    return (*solids_at_the_start(level), block)
 
 
 def obstructions(level: Level, blocks: Sequence[Solid], positions: Float64) -> dict[int, str]:
@@ -99,25 +87,8 @@ def obstructions(level: Level, blocks: Sequence[Solid], positions: Float64) -> d
         For the index of each position that is not free, the field of the level that is there.
     """
     margin = max(level.ball.radius - TOUCHING_M, 0.0)
-    inside = _inside(blocks, positions, margin)
-    return {int(index): block.source for block, indices in inside for index in indices}
-
-
-class _InUnit:
-    """Writes lengths in the unit of the level's file."""
-
-    def __init__(self, unit: Unit) -> None:
-        self._unit, self._scale = unit, METRES_PER_UNIT[unit]
-
-    def length(self, metres: float) -> str:
-        value = f"{metres / self._scale:.6g}"
-        return f"{value} {self._unit}{'' if value == '1' else 's'}"
-
-    def rounded_up(self, metres: float) -> str:
-        return self.length(math.ceil(metres / self._scale * 100.0) / 100.0 * self._scale)
-
-    def point(self, point: Sequence[float]) -> str:
-        return f"[{', '.join(f'{value / self._scale:.6g}' for value in point)}]"
+    held = inside(blocks, positions, margin)
+    return {int(index): block.source for block, indices in held for index in indices}
 
 
 def _totals(level: Level) -> Iterator[Problem]:
@@ -198,7 +169,7 @@ def _links(level: Level) -> Iterator[Problem]:
 _NO_GATES: Final = "the level has no gates that a plate could open"
 
 
-def _heights(level: Level, in_unit: _InUnit) -> Iterator[Problem]:
+def _heights(level: Level, in_unit: InUnit) -> Iterator[Problem]:
     points: list[tuple[FieldPath, str, float]] = [
         (("start", "at"), "the ball starts", level.start.at[2]),
         (("finish", "at"), "the finish is", level.finish.at[2]),
@@ -213,7 +184,7 @@ def _heights(level: Level, in_unit: _InUnit) -> Iterator[Problem]:
             yield Problem(path, f"{found}; wanted above the kill height, {limit}")
 
 
-def _movers(level: Level, in_unit: _InUnit) -> Iterator[Problem]:
+def _movers(level: Level, in_unit: InUnit) -> Iterator[Problem]:
     for index, plate in enumerate(level.plates):
         struck_at = level.ball.radius + plate.size[2] / 2
         if struck_at < PLATE_HIT_HEIGHT_M + TOUCHING_M:
@@ -231,7 +202,7 @@ def _movers(level: Level, in_unit: _InUnit) -> Iterator[Problem]:
             yield _rises(gate, ("gates", index, "lowers_to"), gate.lowers_to, in_unit)
 
 
-def _rises(mover: Plate | Gate, path: FieldPath, target: float, in_unit: _InUnit) -> Problem:
+def _rises(mover: Plate | Gate, path: FieldPath, target: float, in_unit: InUnit) -> Problem:
     found = "found" if path[-1] in mover.model_fields_set else "not given, so it is the original's"
     allowed = f"wanted at most the height of 'at', {in_unit.length(mover.at[2])}"
     return Problem(path, f"{found} {in_unit.length(target)}; {allowed}")
@@ -246,18 +217,6 @@ def _lift_pads(level: Level) -> Iterator[Problem]:
             yield Problem(path, f"{found}; wanted more than its weight, {weight:.6g} N")
 
 
-def _solid_at_the_start(level: Level) -> tuple[Solid, ...]:
-    """Return the static solids, and what moves where it stands at the start."""
-    blocks = list(solids(level))
-    for kind in ("plates", "gates", "lift_pads"):
-        for index, piece in enumerate(getattr(level, kind)):
-            length, width, height = piece.size
-            half = (length / 2, width / 2, height / 2)
-            rotation = rotation_matrix(getattr(piece, "yaw_deg", 0.0))
-            blocks.append(Solid(piece.at, half, rotation, "default", f"{kind}[{index}]"))
-    return tuple(blocks)
-
-
 def _tubes(level: Level, everything: Sequence[Solid]) -> Iterator[Problem]:
     sources = {solid.source for solid in everything}
     for index in range(len(level.tubes)):
@@ -266,87 +225,40 @@ def _tubes(level: Level, everything: Sequence[Solid]) -> Iterator[Problem]:
             yield Problem(("tubes", index, "opening"), message)
 
 
-def _start(level: Level, everything: Sequence[Solid], in_unit: _InUnit) -> Iterator[Problem]:
+def _start(level: Level, everything: Sequence[Solid], in_unit: InUnit) -> Iterator[Problem]:
     radius, jitter = level.ball.radius, level.start.jitter
-    steps = [min(math.ceil(half / radius), MAX_JITTER_SAMPLES // 2) for half in jitter]
-    offsets = [
-        np.linspace(-half, half, 1 + 2 * n) if n else np.zeros(1)
-        for half, n in zip(jitter, steps, strict=True)
-    ]
-    xs, ys = np.meshgrid(*offsets, indexing="ij")
-    positions = np.array(level.start.at) + np.stack([xs, ys, 0.0 * xs], axis=-1).reshape(-1, 3)
+    where = " somewhere within its jitter" if any(jitter) else ""
+    ball = f"the ball, of radius {in_unit.length(radius)}, would start"
     margin = max(radius - TOUCHING_M, 0.0)
-    hit = dict.fromkeys(solid.source for solid, _ in _inside(everything, positions, margin))
+    hit = dict.fromkeys(solid.source for solid, _ in inside(everything, starts(level), margin))
     if hit:
-        where = " somewhere within its jitter" if any(jitter) else ""
         yield Problem(
             ("start", "at"),
-            f"the ball, of radius {in_unit.length(radius)}, would start inside {', '.join(hit)}"
-            f"{where}; wanted free space around it (on a floor: one radius over its upper face)",
+            f"{ball} inside {', '.join(hit)}{where}; "
+            "wanted free space around it (on a floor: one radius over its upper face)",
         )
+    beyond = [
+        max(abs(here - there) - edge / 2 - play, 0.0)
+        for here, there, edge, play in zip(
+            level.start.at, level.finish.at, level.finish.size, (*jitter, 0.0), strict=True
+        )
+    ]
+    if math.hypot(*beyond) <= radius + TOUCHING_M:
+        message = f"{ball} in the finish{where}; wanted outside, at least its radius away"
+        yield Problem(("start", "at"), message)
 
 
-def _coins(level: Level, everything: Sequence[Solid], in_unit: _InUnit) -> Iterator[Problem]:
+def _finish(level: Level, everything: Sequence[Solid]) -> Iterator[Problem]:
+    static = [solid for solid in everything if is_static(solid)]
+    around = burying(static, level.finish.at, level.finish.size, level.ball.radius)
+    if around:
+        message = f"the finish is wholly inside {', '.join(around)}, where no ball can reach it"
+        yield Problem(("finish", "at"), message)
+
+
+def _coins(level: Level, in_unit: InUnit) -> Iterator[Problem]:
     positions, sources = coin_positions(level)
     low = np.flatnonzero(positions[:, 2] <= level.kill_height)
     limit = in_unit.length(level.kill_height)
-    for path, text in _coin_groups(low, positions, sources, in_unit):
+    for path, text, _ in coin_groups(low, positions, sources, in_unit):
         yield Problem(path, f"{text} not above the kill height, {limit}; move it up")
-    around: dict[int, str] = {}
-    shrunk = [replace(solid, half_size=_shrunk(solid.half_size)) for solid in everything]
-    for solid, indices in _inside(shrunk, positions, 0.0):
-        around.update(dict.fromkeys(indices.tolist(), solid.source))
-    buried = np.array(sorted(around), dtype=np.intp)
-    for path, text in _coin_groups(buried, positions, sources, in_unit):
-        first = next(index for index in buried if sources[index] == f"{path[0]}[{path[1]}]")
-        yield Problem(path, f"{text} inside {around[int(first)]}; move it into free space")
-
-
-def _coin_groups(
-    indices: npt.NDArray[np.intp], positions: Float64, sources: Sequence[str], in_unit: _InUnit
-) -> Iterator[tuple[FieldPath, str]]:
-    """Yield, for each piece that some of the coins come from, its path and the first of them."""
-    groups: dict[str, list[int]] = {}
-    for index in indices.tolist():
-        groups.setdefault(sources[index], []).append(index)
-    for source, members in groups.items():
-        kind, _, number = source.removesuffix("]").partition("[")
-        where = in_unit.point(positions[members[0]].tolist())
-        others = f" (the first of {len(members)})" if len(members) > 1 else ""
-        yield (kind, int(number)), f"the coin at {where}{others} is"
-
-
-def _shrunk(half_size: tuple[float, float, float]) -> tuple[float, float, float]:
-    x, y, z = (max(half - TOUCHING_M, 0.0) for half in half_size)
-    return x, y, z
-
-
-def _inside(
-    blocks: Sequence[Solid], points: Float64, margin: float
-) -> Iterator[tuple[Solid, npt.NDArray[np.intp]]]:
-    """Yield each solid that holds points, with their indices.
-
-    Of the three axes, each solid looks along the one on which fewest points fall into its extent:
-    a level's thousands of cells then meet only the few coins near them.
-    """
-    if not blocks or not len(points):
-        return
-    centres = np.array([solid.centre for solid in blocks])
-    rotations = np.array([solid.rotation for solid in blocks])
-    halves = np.array([solid.half_size for solid in blocks])
-    reach = np.einsum("nij,nj->ni", np.abs(rotations), halves) + margin + TOUCHING_M
-    orders = [np.argsort(points[:, axis]) for axis in range(3)]
-    spans = np.empty((3, 2, len(blocks)), dtype=np.intp)
-    for axis, order in enumerate(orders):
-        along = points[order, axis]
-        spans[axis, 0] = np.searchsorted(along, centres[:, axis] - reach[:, axis], "left")
-        spans[axis, 1] = np.searchsorted(along, centres[:, axis] + reach[:, axis], "right")
-    counts = spans[:, 1] - spans[:, 0]
-    narrowest = counts.argmin(axis=0)
-    for number in np.flatnonzero(counts.min(axis=0) > 0).tolist():
-        axis = int(narrowest[number])
-        first, last = spans[axis, :, number]
-        near = orders[axis][first:last]
-        found = near[blocks[number].contains(points[near], margin)]
-        if len(found):
-            yield blocks[number], found

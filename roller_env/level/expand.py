@@ -53,10 +53,14 @@ class Solid:
         return self.rotation == _IDENTITY
 
     def contains(self, points: Float64, margin: float = 0.0) -> npt.NDArray[np.bool_]:
-        """Say which of ``points``, (n, 3) in metres, lie inside or within ``margin`` of it."""
+        """Say which of ``points``, (n, 3) in metres, lie inside or within ``margin`` of it.
+
+        With a ``margin`` below zero, which lie inside and that deep under each face.
+        """
         local = (points - np.array(self.centre)) @ np.array(self.rotation)
-        outside = np.maximum(np.abs(local) - np.array(self.half_size), 0.0)
-        inside: npt.NDArray[np.bool_] = (outside**2).sum(axis=-1) <= margin**2
+        half = np.maximum(np.array(self.half_size) + min(margin, 0.0), 0.0)
+        outside = np.maximum(np.abs(local) - half, 0.0)
+        inside: npt.NDArray[np.bool_] = (outside**2).sum(axis=-1) <= max(margin, 0.0) ** 2
         return inside
 
 

@@ -8,7 +8,9 @@ not be read would make every plate that names it look wrong.
 
 from __future__ import annotations
 
+import math
 import os
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -19,11 +21,13 @@ from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema
 
 from roller_env.assets import asset_directory
-from roller_env.level.check import Unit, check_level
-from roller_env.level.errors import LevelError
-from roller_env.level.lint import lint
+from roller_env.level.check import check_level
+from roller_env.level.doubts import level_warnings
+from roller_env.level.errors import LevelError, LevelWarning
+from roller_env.level.lint import Play, lint
 from roller_env.level.messages import explain
 from roller_env.level.schema import METRES_PER_UNIT, SCALE_KEY, Level
+from roller_env.level.words import Unit
 from roller_env.problems import Problem, listed, quoted
 from roller_env.regular_files import read_regular_file
 from roller_env.yaml_tree import MAX_BYTES, Node, YamlError, plain_tree, read_tree
@@ -32,7 +36,7 @@ SUFFIXES: Final = (".yaml", ".yml")
 
 
 def load_level(source: str | os.PathLike[str] | Level | Mapping[str, Any]) -> Level:
-    """Load and check a level.
+    """Load and check a level; what is strange about it is a `LevelWarning`.
 
     Args:
         source: the name of a shipped level ("classic"), the path of a .yaml file, the fields of a
@@ -49,36 +53,42 @@ def load_level(source: str | os.PathLike[str] | Level | Mapping[str, Any]) -> Le
     """
     if isinstance(source, Level):
         _refuse(check_level(source))
+        _warn(level_warnings(source), stacklevel=3)
         return source
     if isinstance(source, Mapping):
         try:
-            return _level(_tree(lambda: plain_tree(source)), "", "")
+            level, doubts = _examined(_tree(lambda: plain_tree(source)), "", "")
         except LevelError as error:
             raise LevelError(map(_without_a_place, error.problems)) from None
+        _warn(map(_without_a_place, doubts), stacklevel=3)
+        return level
     path = _path_of(source)
-    return parse_level(_text_of(_read(path), str(path)), str(path))
+    filename, text = str(path), _decoded(_read(path), str(path))
+    level, doubts = _examined(_tree(lambda: read_tree(text, filename)), text, filename)
+    _warn(doubts, stacklevel=3)
+    return level
 
 
-def examine_level(source: str | os.PathLike[str], dt_s: float) -> tuple[Level, tuple[Problem, ...]]:
-    """Load and check a level, and look for what a designer hardly meant.
+def examine_level(source: str | os.PathLike[str], play: Play) -> tuple[Level, tuple[Problem, ...]]:
+    """Load and check a level, and look long for what a designer hardly meant.
 
     Args:
         source: the name of a shipped level, or a path, as for `load_level`.
-        dt_s: physics step of the preset that it is to be played with, seconds.
+        play: how it is to be played.
 
     Returns:
-        The level, and the warnings in the order of the file; see `roller_env.level.lint`.
+        The level, and the warnings in the order of the file: those that `load_level` shows, and
+        those of `roller_env.level.lint`.
 
     Raises:
         LevelError: it cannot be played.
     """
     path = _path_of(source)
-    filename = str(path)
-    text = _text_of(_read(path), filename)
+    filename, text = str(path), _decoded(_read(path), str(path))
     root = _tree(lambda: read_tree(text, filename))
-    level = _level(root, text, filename)
-    warnings = (_placed(found, root, filename) for found in lint(level, dt_s, _unit(root)))
-    return level, tuple(_in_file_order(warnings))
+    level, doubts = _examined(root, text, filename)
+    found = (_placed(problem, root, filename) for problem in lint(level, play, _unit(root)))
+    return level, tuple(_in_file_order((*doubts, *found)))
 
 
 def is_path(source: str) -> bool:
@@ -88,7 +98,7 @@ def is_path(source: str) -> bool:
 
 
 def parse_level(text: str, filename: str = "<text>") -> Level:
-    """Load and check a level from the text of a level file.
+    """Load and check a level from the text of a level file, as `load_level` does a file.
 
     Args:
         text: YAML; the format is described in docs/levels.md.
@@ -100,7 +110,9 @@ def parse_level(text: str, filename: str = "<text>") -> Level:
     Raises:
         LevelError: the level has problems; all of them are in ``problems``.
     """
-    return _level(_tree(lambda: read_tree(text, filename)), text, filename)
+    level, doubts = _examined(_tree(lambda: read_tree(text, filename)), text, filename)
+    _warn(doubts, stacklevel=3)
+    return level
 
 
 def _tree(read: Callable[[], Node]) -> Node:
@@ -111,15 +123,15 @@ def _tree(read: Callable[[], Node]) -> Node:
         raise LevelError(error.problems) from None
 
 
-def _level(root: Node, text: str, filename: str) -> Level:
-    """Return the level that a tree says, if it is right in shape and in meaning."""
+def _examined(root: Node, text: str, filename: str) -> tuple[Level, list[Problem]]:
+    """Return the level that a tree says, if it is right in shape and in meaning, and its doubts."""
     unit = _unit(root)
     try:
         level = Level.model_validate(root.plain(), context={SCALE_KEY: METRES_PER_UNIT[unit]})
     except ValidationError as error:
         raise LevelError(_in_file_order(explain(error, root, text, filename))) from None
     _refuse(_placed(problem, root, filename) for problem in check_level(level, unit))
-    return level
+    return level, [_placed(doubt, root, filename) for doubt in level_warnings(level, unit)]
 
 
 def shipped_levels() -> tuple[str, ...]:
@@ -193,7 +205,7 @@ def _read(path: Path) -> bytes:
     raise LevelError([replace(problem, filename=str(path))])
 
 
-def _text_of(data: bytes, filename: str) -> str:
+def _decoded(data: bytes, filename: str) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -219,10 +231,17 @@ def _without_a_place(problem: Problem) -> Problem:
 
 
 def _in_file_order(problems: Iterable[Problem]) -> list[Problem]:
-    return sorted(problems, key=lambda problem: (problem.line or 0, problem.column or 0))
+    return sorted(problems, key=lambda problem: (problem.line or math.inf, problem.column or 0))
 
 
 def _refuse(problems: Iterable[Problem]) -> None:
     found = _in_file_order(problems)
     if found:
         raise LevelError(found)
+
+
+def _warn(problems: Iterable[Problem], stacklevel: int) -> None:
+    """Show all problems in one warning, at the caller that many calls up."""
+    found = tuple(_in_file_order(problems))
+    if found:
+        warnings.warn(LevelWarning(found), stacklevel=stacklevel)

@@ -15,7 +15,7 @@ from pydantic_core import ErrorDetails
 from pydantic_core.core_schema import ErrorType
 
 from roller_env.level.schema import COLOUR_PATTERN, NAME_PATTERN, Level
-from roller_env.problems import FieldPath, Problem, listed, quoted
+from roller_env.problems import MAX_PROBLEMS, FieldPath, Problem, listed, quoted
 from roller_env.yaml_tree import Node
 
 _PATTERNS: Final = {
@@ -31,7 +31,7 @@ Schema = dict[str, Any]
 
 
 def explain(error: ValidationError, root: Node, text: str, filename: str) -> list[Problem]:
-    """Return the error's findings as problems of the file.
+    """Return the error's findings as problems of the file, up to `MAX_PROBLEMS` of them.
 
     Args:
         error: what pydantic says of the plain data of ``root``.
@@ -40,13 +40,16 @@ def explain(error: ValidationError, root: Node, text: str, filename: str) -> lis
         filename: its name.
     """
     problems: dict[Problem, None] = {}
-    for details in error.errors(include_url=False):
+    for details in error.errors(include_url=False)[:MAX_PROBLEMS]:
         problem = _in_words(details, root)
         of_key = details["type"] == "extra_forbidden" or details["loc"][-1:] == ("[key]",)
         line, column = root.position(problem.path, of_key=of_key)
         if details["type"] in _PLAN_ROW_ERRORS:
             line, column = _plan_place(root, problem.path, text, details["ctx"])
         problems[replace(problem, filename=filename, line=line, column=column)] = None
+    more = error.error_count() - MAX_PROBLEMS
+    if more > 0:
+        problems[Problem((), f"{more} more fields are wrong", filename)] = None
     return list(problems)
 
 

@@ -253,7 +253,7 @@ def test_a_plate_opens_only_the_gates_that_it_names() -> None:
     assert all(game.slab(name) / Q < -90 for name in "abc")
 
 
-def test_two_plates_may_open_one_gate_and_it_lowers_once() -> None:
+def test_any_one_of_two_plates_opens_their_gate_and_it_lowers_once() -> None:
     plates = [PLATE, PLATE | {"name": "other", "at": q(-300, 0, 72)}]
     game = Game(plate_level(plates=plates))
     game.play(8.0)

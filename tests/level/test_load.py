@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import pickle
+import time
 from pathlib import Path
 
 import pytest
@@ -17,6 +19,7 @@ from roller_env.level import (
     parse_level,
     shipped_levels,
 )
+from roller_env.problems import MAX_PROBLEMS
 from roller_env.units import quants
 from roller_env.yaml_tree import MAX_BYTES
 from tests.level.samples import COMPLETE, SMALL, small_level
@@ -88,11 +91,11 @@ def test_a_level_object_is_checked_and_returned() -> None:
 
 def test_a_bad_level_object_is_refused_by_its_field_without_a_line() -> None:
     with pytest.raises(LevelError) as caught:
-        load_level(small_level(coins=[{"at": (1.0, 0.0, -0.5)}]))
+        load_level(small_level(coins=[{"at": (1.0, 0.0, -90.0)}]))
     (problem,) = caught.value.problems
     assert problem.path == ("coins", 0)
     assert problem.line is None
-    assert str(problem).startswith("coins[0]: the coin at [1, 0, -0.5] is inside boxes[0]")
+    assert str(problem).startswith("coins[0]: the coin at [1, 0, -90] is not above the kill height")
 
 
 def test_every_shipped_level_loads_by_name_and_by_path() -> None:
@@ -156,6 +159,31 @@ def test_bytes_that_are_not_utf_8_are_placed(tmp_path: Path) -> None:
         load_level(path)
     wanted = f"{path}:7:10: found the byte 0xf6, which is not UTF-8; save it as UTF-8"
     assert str(caught.value) == wanted
+
+
+PIECES = {
+    "boxes": "".join(
+        f"- {{at: [{n % 140}, {n // 140}, -1], size: [1, 1, 1]}}\n" for n in range(19_000)
+    ),
+    "numbers": "- 0\n" * 120_000,
+    "wrong boxes": "- {at: [a, b, -1], size: [1, 1, q]}\n" * 19_000,
+}
+
+
+@pytest.mark.parametrize("boxes", PIECES.values(), ids=PIECES)
+def test_a_mebibyte_of_level_is_loaded_or_refused_in_two_seconds(boxes: str) -> None:
+    text = "name: t\nstart: {at: [0, 0, 1]}\nfinish: {at: [5, 0, 2], size: [1, 1, 1]}\nboxes:\n"
+    begin = time.process_time()
+    with contextlib.suppress(LevelError):
+        assert len(parse_level(text + boxes).boxes) == 19_000
+    assert time.process_time() - begin < 2.0
+
+
+def test_of_thousands_of_wrong_fields_the_first_are_told() -> None:
+    with pytest.raises(LevelError) as caught:
+        parse_level(SMALL + "plates:\n" + "- 0\n" * 5_000)
+    assert len(caught.value.problems) == MAX_PROBLEMS + 1
+    assert caught.value.problems[-1].message == "4000 more fields are wrong"
 
 
 def test_a_file_may_be_one_mebibyte_and_no_more(tmp_path: Path) -> None:
@@ -466,10 +494,16 @@ BROKEN_MEANING = {
             "(did you mean 'door'?)"
         ],
     ),
-    "coin in a solid": (
-        SMALL + "coins:\n  - at: [9, 0, 16]\n  - line: {start: [9, 0, 16], end: [9, 0, -4], "
-        "count: 6}\n",
-        ["9:5: coins[1]: the coin at [9, 0, -4] is inside boxes[0]; move it into free space"],
+    "start in the finish": (
+        SMALL.replace("[500, 0, 16]", "[20, 0, 16]"),
+        [
+            "3:13: start.at: the ball, of radius 16 quants, would start in the finish; wanted "
+            "outside, at least its radius away"
+        ],
+    ),
+    "finish in a solid": (
+        SMALL.replace("[500, 0, 16], size: [32, 32, 32]", "[500, 0, -8], size: [8, 8, 8]"),
+        ["4:14: finish.at: the finish is wholly inside boxes[0], where no ball can reach it"],
     ),
     "several, in the order of the file": (
         SMALL.replace("16]}", "4]}").replace("[500, 0, 16]", "[500, 0, -1129]"),

@@ -17,6 +17,8 @@ from tests.level.samples import COMPLETE, SMALL
 from tests.strategies import as_yaml, levels
 
 SYNTAX = st.text("{}[]:,-&*!|>'\"#%@`?~<= \n\ta01.\\xu\0\x85\ufeff", max_size=60)
+pytestmark = pytest.mark.filterwarnings("ignore::roller_env.level.LevelWarning")
+
 COMPLETE_DATA = yaml.safe_load(COMPLETE)
 JUNK: st.SearchStrategy[Any] = st.recursive(
     st.none()
