@@ -23,6 +23,7 @@ from typing import Annotated, Final, Literal
 import tyro
 
 from roller_env.game.actions import KEY_FORCE_N
+from roller_env.game.tables import COIN_REACH_M
 from roller_env.level import (
     Level,
     LevelError,
@@ -32,7 +33,7 @@ from roller_env.level import (
     load_level,
     parse_level,
 )
-from roller_env.level.lint import Play
+from roller_env.level.reach import Play
 from roller_env.level.template import new_level
 from roller_env.physics.presets import physics_preset
 from roller_env.problems import Problem, printable, shown
@@ -134,7 +135,11 @@ def _report(source: str, physics: Preset) -> tuple[int, int]:
 
 def _play(physics: Preset) -> Play:
     # The hardest push is that of two keys.
-    return Play(dt_s=physics_preset(physics).dt_s, push_n=math.hypot(KEY_FORCE_N, KEY_FORCE_N))
+    return Play(
+        dt_s=physics_preset(physics).dt_s,
+        push_n=math.hypot(KEY_FORCE_N, KEY_FORCE_N),
+        coin_reach_m=COIN_REACH_M,
+    )
 
 
 def _line(problem: Problem, kind: str) -> str:

@@ -24,8 +24,9 @@ from roller_env.assets import asset_directory
 from roller_env.level.check import check_level
 from roller_env.level.doubts import level_warnings
 from roller_env.level.errors import LevelError, LevelWarning
-from roller_env.level.lint import Play, lint
+from roller_env.level.lint import lint
 from roller_env.level.messages import explain
+from roller_env.level.reach import Play
 from roller_env.level.schema import METRES_PER_UNIT, SCALE_KEY, Level
 from roller_env.level.words import Unit
 from roller_env.problems import Problem, listed, quoted
