@@ -33,6 +33,9 @@ _KERB: Final = 0.58
 elasticity: the largest (1 - 5 x / 7) sqrt(1 - (1 - x)^2), x = h / r, from the conservation of
 angular momentum about the edge."""
 
+_HIGHER: Final = 1e-6
+"""Metres that do not count."""
+
 _FAR: Final = np.iinfo(np.int32).max // 2
 _NEIGHBOURS: Final = [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if (x, y) != (0, 0)]
 
@@ -221,6 +224,7 @@ class _Flood:
     Attributes:
         away: (spans,) columns from the nearest support that was reached, over which the ball flies;
             0 for what was reached, `_FAR` for where it has not been.
+        cap: (spans,) highest that its centre can be there, for what it had to pass under, metres.
     """
 
     def __init__(self, level: Level, play: Play, spans: Spans) -> None:
@@ -230,6 +234,7 @@ class _Flood:
         self._column = spans.column
         self._support = spans.is_support
         self.away = np.full(len(spans.floor), _FAR, dtype=np.int32)
+        self.cap = np.full(len(spans.floor), -np.inf)
 
     def begin(self) -> bool:
         """Put the ball on what is under its start; say whether there is anything."""
@@ -253,7 +258,7 @@ class _Flood:
     def boxes(self, motion: _Motion) -> _Boxes:
         """Return where the ball's centre can be."""
         flown = np.maximum(self.away - _NEAR, 0) * self._spans.cell
-        high = np.minimum(motion.apex - motion.drop(flown), self._spans.ceiling)
+        high = np.minimum(motion.apex - motion.drop(flown), self.cap)
         reached = self.away == 0
         high[reached] = np.maximum(high[reached], self._spans.floor[reached])
         high[self.away == _FAR] = -np.inf
@@ -317,10 +322,8 @@ class _Flood:
         firm = reached[spans.kind[reached] != EDGE]
         for step in ((1, 0), (-1, 0), (0, 1), (0, -1)):
             for here, there in self._pairs(firm, step):
-                both = self.away[there] == 0
-                here, there = here[both], there[both]
                 up = spans.floor[there] - spans.floor[here]
-                higher = (up > 1e-6) & (up <= self._climb)
+                higher = (self.away[there] == 0) & (up > _HIGHER) & (up <= self._climb)
                 slopes = higher & (spans.kind[there] == SLOPE)
                 if (higher & ~slopes).any():
                     best = max(best, _KERB)
@@ -332,10 +335,8 @@ class _Flood:
     def _pairs(self, of: Indices, step: tuple[int, int]) -> Iterator[tuple[Indices, Indices]]:
         """Yield spans with a span each of the column ``step`` away; each pair once."""
         spans = self._spans
-        x, y = (
-            self._column[of] // spans.shape[1] + step[0],
-            self._column[of] % spans.shape[1] + step[1],
-        )
+        x, y = np.divmod(self._column[of], spans.shape[1])
+        x, y = x + step[0], y + step[1]
         inside = (x >= 0) & (x < spans.shape[0]) & (y >= 0) & (y < spans.shape[1])
         of, beside = of[inside], (x * spans.shape[1] + y)[inside]
         layer = 0
@@ -347,7 +348,7 @@ class _Flood:
 
     def _spread(self, motion: _Motion) -> None:
         """Let the ball roll and fly on from what has been reached."""
-        spans, away = self._spans, self.away
+        spans, away, cap = self._spans, self.away, self.cap
         useful = float(spans.floor[self._support].min()) - self._climb
         useful = min(useful, self._level.finish.at[2] - self._level.finish.size[2])
         farthest = int(motion.range(np.array(motion.apex - useful)) / spans.cell) + _NEAR
@@ -355,6 +356,9 @@ class _Flood:
         drop = motion.apex + self._climb - np.where(self._support, spans.floor, -np.inf)
         land = np.minimum(motion.range(drop) / spans.cell + _NEAR, float(_FAR))
         front = np.flatnonzero(away == 0)
+        away[away > 0] = _FAR
+        stays = np.maximum(np.minimum(spans.ceiling, motion.apex), spans.floor)
+        cap[:] = np.where(away == 0, stays, -np.inf)
         while len(front):
             changed = []
             for step in _NEIGHBOURS:
@@ -363,11 +367,15 @@ class _Flood:
                     low = np.maximum(spans.floor[here], spans.floor[there])
                     top = np.minimum(spans.ceiling[here], spans.ceiling[there])
                     rise = np.where(rolls, spans.floor[here] + self._climb, -np.inf)
-                    free = (low <= top) & (low <= np.maximum(rise, motion.apex))
+                    free = (low <= top) & (low <= np.maximum(rise, cap[here] + self._climb))
                     beyond = away[here] + 1
                     lands = (rolls | (beyond <= land[there])) & self._support[there]
                     new = np.where(lands, 0, beyond)
-                    better = free & (new < away[there]) & (new <= farthest)
-                    away[there[better]] = new[better]
-                    changed.append(there[better])
+                    under = np.where(lands, stays[there], np.minimum(cap[here], top))
+                    nearer = (new < away[there]) | (under > cap[there] + _HIGHER)
+                    better = free & nearer & (new <= farthest)
+                    at = there[better]
+                    away[at] = np.minimum(new[better], away[at])
+                    cap[at] = np.maximum(under[better], cap[at])
+                    changed.append(at)
             front = np.unique(np.concatenate(changed))

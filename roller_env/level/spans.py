@@ -219,7 +219,7 @@ def _complement(
                 np.full(len(empty), np.inf),
             ]
         )[arranged],
-        kind=np.append(kinds[upper][over], np.zeros(len(void), dtype=np.int8))[arranged],
+        kind=np.append(kinds[upper][over], np.full(len(void), EDGE)).astype(np.int8)[arranged],
         solid=np.append(numbers[upper][over], np.full(len(void), -1))[arranged],
         under=np.append((tops[upper] - bottoms[block])[over] - 2.0 * radius, -below)[arranged],
     )

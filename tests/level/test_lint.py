@@ -14,16 +14,19 @@ from roller_env.game.tables import COIN_REACH_M
 from roller_env.level import Level, load_level, parse_level, shipped_levels
 from roller_env.level.lint import lint
 from roller_env.level.reach import Play, reach
+from roller_env.level.schema import Coins
 from roller_env.level.template import new_level
 from roller_env.physics.presets import PRESETS
 from roller_env.problems import FieldPath, Problem
+from roller_env.replay import frames, load_replay, shipped_replays
 from roller_env.units import quants
 from tests.level.samples import SMALL, small_level
 from tests.level.test_docs import EXAMPLES, LEFT_OUT, completed
+from tests.replay.recording import wandered
 
 RADIUS = quants(16.0)
 PLATE = {"name": "plate", "at": (3.0, 0.0, 0.25), "size": (1.0, 1.0, 0.5), "sinks_to": 0.1}
-GATE = {"name": "gate", "at": (6.0, 0.0, 1.0), "size": (0.2, 6.0, 2.0), "lowers_to": -1.1}
+GATE = {"name": "gate", "at": (6.0, 0.0, 1.0), "size": (0.2, 40.0, 2.0), "lowers_to": -1.1}
 LINKED = {"plates": [PLATE | {"opens": ["gate"]}], "gates": [GATE]}
 FLOOR = {"at": (8.0, 0.0, -0.5), "size": (20.0, 6.0, 1.0)}
 """The floor of the small level, whose upper face is at 0 from x = -2 to 18, y = -3 to 3."""
@@ -60,7 +63,10 @@ def test_a_new_level_is_not_warned_of() -> None:
 def test_no_example_of_the_page_is_warned_of_what_it_says_itself(example: str) -> None:
     found = warned(parse_level(completed(example)))
     # An example without a floor has none; and what the test adds lies where nothing leads.
-    if all(f"{kind}:" not in example for kind in ("floors", "boxes", "ramps", "walls", "tubes")):
+    if all(
+        f"{kind}:" not in example
+        for kind in ("floors", "boxes", "ramps", "walls", "tubes", "lift_pads")
+    ):
         assert [problem.path for problem in found] == [()]
     elif "start" in example:
         assert found == []
@@ -108,7 +114,7 @@ def test_a_coin_that_hangs_too_high_is_out_of_reach_without_anything_to_rise_on(
 def test_the_first_of_a_row_of_coins_out_of_reach_is_named() -> None:
     line = {"line": {"start": (12.0, 0.0, 0.4), "end": (32.0, 0.0, 0.4), "count": 11}}
     (problem,) = warned(coins=[line])
-    assert problem.message.startswith("the coin at [26, 0, 0.4] (the first of 4) is out of reach")
+    assert problem.message.startswith("the coin at [30, 0, 0.4] (the first of 2) is out of reach")
 
 
 def test_a_deck_to_which_nothing_leads_up_is_out_of_reach() -> None:
@@ -122,19 +128,19 @@ def test_a_deck_to_which_nothing_leads_up_is_out_of_reach() -> None:
 
 
 def walls(height: float) -> dict[str, Any]:
-    """A wall across the floor."""
-    return {"at": (6.0, 0.0, height / 2), "size": (0.2, 6.0, height)}
+    """A wall across the floor, and so far beyond it that no ball flies round its end."""
+    return {"at": (6.0, 0.0, height / 2), "size": (0.2, 40.0, height)}
 
 
 def test_a_finish_behind_a_wall_is_out_of_reach_and_one_behind_a_doorway_is_not() -> None:
     assert fields(boxes=[FLOOR, walls(2.0)]) == [("finish", "at")]
-    left = {"at": (6.0, 2.0, 1.0), "size": (0.2, 2.0, 2.0)}
-    right = {"at": (6.0, -2.0, 1.0), "size": (0.2, 2.0, 2.0)}
+    left = {"at": (6.0, 10.5, 1.0), "size": (0.2, 20.0, 2.0)}
+    right = {"at": (6.0, -10.5, 1.0), "size": (0.2, 20.0, 2.0)}
     assert fields(boxes=[FLOOR, left, right]) == []
 
 
 def test_a_room_whose_wall_is_turned_is_closed_too() -> None:
-    wall = {"at": (6.0, 0.0, 1.0), "size": (0.05, 12.0, 2.0), "yaw_deg": 37.0}
+    wall = {"at": (6.0, 0.0, 1.0), "size": (0.05, 60.0, 2.0), "yaw_deg": 37.0}
     assert fields(boxes=[FLOOR, wall]) == [("finish", "at")]
 
 
@@ -142,7 +148,7 @@ def test_a_gate_is_a_way_if_its_plate_can_be_struck() -> None:
     assert fields(**LINKED) == []
     # Behind the gate that it opens.
     behind = PLATE | {"opens": ["gate"], "at": (9.0, 0.0, 0.25)}
-    tall = GATE | {"at": (6.0, 0.0, 20.0), "size": (0.2, 6.0, 40.0), "lowers_to": -20.1}
+    tall = GATE | {"at": (6.0, 0.0, 20.0), "size": (0.2, 40.0, 40.0), "lowers_to": -20.1}
     assert fields(plates=[behind], gates=[tall]) == [("finish", "at"), ("plates", 0, "at")]
 
 
@@ -154,7 +160,7 @@ def test_a_plate_in_the_air_is_out_of_reach() -> None:
 
 def test_a_gate_that_still_stands_out_when_it_is_open_is_warned_of() -> None:
     half_open = GATE | {"lowers_to": 0.0}
-    (problem,) = warned(**LINKED | {"gates": [half_open]})
+    (problem,) = warned(plates=LINKED["plates"], gates=[half_open])
     assert problem.path == ("gates", 0, "lowers_to")
     assert "the open gate still stands 1 metre over the ground" in problem.message
     assert "wanted at most -1 metres" in problem.message
@@ -180,28 +186,42 @@ def test_the_original_s_height_of_an_open_gate_is_warned_of_on_a_deck_that_it_do
 def test_a_floor_too_thin_for_the_falls_onto_it_is_warned_of() -> None:
     ball = {"radius": 0.05}
     tower = {"at": (0.0, 0.0, 19.5), "size": (2.0, 2.0, 1.0)}
-    thin = {"at": (8.0, 0.0, -0.005), "size": (20.0, 6.0, 0.01)}
-    changes: dict[str, Any] = {"start": {"at": (0.0, 0.0, 20.05)}, "ball": ball}
+    thin = {"at": (2.0, 0.0, -0.005), "size": (6.0, 2.0, 0.01)}
+    changes: dict[str, Any] = {"ball": ball, "finish": finish_at(4.0, 0.0, 0.5)}
+    changes["start"] = {"at": (0.0, 0.0, 20.05)}
     (problem,) = warned(boxes=[tower, thin], **changes)
     assert problem.path == ("boxes", 1)
     assert "from 20 metres up, comes in at 20 m/s" in problem.message
     assert "in a physics step of 4.17 ms; wanted at least 0.09 metres" in problem.message
     assert warned(preset="accurate", boxes=[tower, thin], **changes) == []
-    assert warned(boxes=[tower, thin | {"size": (20.0, 6.0, 0.1)}], **changes) == []
+    assert warned(boxes=[tower, thin | {"size": (6.0, 2.0, 0.1)}], **changes) == []
     # Of two slabs on one another it does not matter where one ends.
-    under = {"at": (8.0, 0.0, -0.5), "size": (20.0, 6.0, 0.99)}
+    under = {"at": (2.0, 0.0, -0.5), "size": (6.0, 2.0, 0.99)}
     assert warned(boxes=[tower, thin, under], **changes) == []
 
 
-def test_what_a_trained_eye_plays_through_is_reached_by_the_flood() -> None:
-    """Every place of the shipped demonstrations' routes lies in what the flood reaches."""
-    for name in shipped_levels():
-        level = load_level(name)
-        found = reach(level, play())
-        assert found is not None
-        assert found.finish
-        assert found.coins.all()
-        assert found.plates.all()
+@pytest.mark.parametrize("name", shipped_levels())
+def test_wherever_a_ball_has_been_a_coin_is_within_reach(name: str) -> None:
+    """Coins are put where the ball was in the shipped demonstration, in the air as well."""
+    replay = load_replay(shipped_replays()[name])
+    path = [frame.qpos[:3].tolist() for frame in frames(replay)][::5]
+    level = replay.level.model_copy(update={"coins": tuple(Coins(at=tuple(at)) for at in path)})
+    found = reach(level, play())
+    assert found is not None
+    assert [at for at, is_found in zip(path, found.coins, strict=False) if not is_found] == []
+    assert found.plates.all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_ball_that_is_driven_off_the_edge_was_within_reach_all_the_way_down(seed: int) -> None:
+    replay = wandered("bridge", seed, max_episode_steps=2_000)
+    path = [frame.qpos[:3].tolist() for frame in frames(replay)]
+    path = [at for at in path if at[2] > replay.level.kill_height][::3]
+    assert path[-1][2] < -1.0
+    level = replay.level.model_copy(update={"coins": tuple(Coins(at=tuple(at)) for at in path)})
+    found = reach(level, play())
+    assert found is not None
+    assert found.coins.all()
 
 
 def test_a_level_too_large_to_search_is_left_alone() -> None:
