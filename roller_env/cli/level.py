@@ -23,7 +23,6 @@ from typing import Annotated, Final, Literal
 import tyro
 
 from roller_env.game.actions import KEY_FORCE_N
-from roller_env.game.tables import COIN_REACH_M
 from roller_env.level import (
     Level,
     LevelError,
@@ -138,7 +137,6 @@ def _play(physics: Preset) -> Play:
     return Play(
         dt_s=physics_preset(physics).dt_s,
         push_n=math.hypot(KEY_FORCE_N, KEY_FORCE_N),
-        coin_reach_m=COIN_REACH_M,
     )
 
 

@@ -99,12 +99,13 @@ def main(argv: Sequence[str] | None = None, prog: str | None = None) -> int:
         prog: what the help calls the command.
     """
     try:
-        return _play(tyro.cli(Arguments, args=argv, prog=prog, description=__doc__))
+        return play(tyro.cli(Arguments, args=argv, prog=prog, description=__doc__))
     except (RuntimeError, ValueError) as error:
         sys.exit(f"error: {printable(error)}")
 
 
-def _play(arguments: Arguments) -> int:
+def play(arguments: Arguments) -> int:
+    """Play what the arguments say; return the exit status, 1 if something was not written."""
     if arguments.game is not None:
         if arguments.level is not None:
             raise ValueError("level: found it twice; give it once, with --level or without")

@@ -17,7 +17,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from roller_env.level.expand import Float64, Solid, coin_positions, pad_groups
-from roller_env.level.schema import PLATE_HIT_HEIGHT_M, Level, Plate
+from roller_env.level.schema import COIN_REACH_M, PLATE_HIT_HEIGHT_M, Level, Plate
 from roller_env.level.space import solids_at_the_start
 from roller_env.level.spans import EDGE, SLOPE, Bool, Indices, Spans, free_spans
 
@@ -46,12 +46,10 @@ class Play(NamedTuple):
     Attributes:
         dt_s: physics step, seconds.
         push_n: the hardest push there is, newtons.
-        coin_reach_m: how near to a coin the ball's centre must come, metres.
     """
 
     dt_s: float
     push_n: float
-    coin_reach_m: float
 
 
 class _Motion(NamedTuple):
@@ -158,12 +156,13 @@ def _flood(level: Level, play: Play, coins: Float64, struck: Bool) -> _Found | N
     spans = free_spans(solids, level.ball.radius, around)
     if spans is None:
         return None
-    flood = _Flood(level, play, spans)
+    lowest = min(finish.at[2] - finish.size[2], *(coins[:, 2] - COIN_REACH_M))
+    flood = _Flood(level, play, spans, lowest)
     if not flood.begin():
         return None
     motion = flood.run()
     boxes = flood.boxes(motion)
-    wide = np.full(3, play.coin_reach_m)
+    wide = np.full(3, COIN_REACH_M)
     radius = level.ball.radius
     return _Found(
         coins=np.array([boxes.meets(at - wide, at + wide) for at in coins], dtype=bool),
@@ -227,8 +226,9 @@ class _Flood:
         cap: (spans,) highest that its centre can be there, for what it had to pass under, metres.
     """
 
-    def __init__(self, level: Level, play: Play, spans: Spans) -> None:
-        self._level, self._spans = level, spans
+    def __init__(self, level: Level, play: Play, spans: Spans, lowest: float) -> None:
+        """Begin a flood; what lies lower than ``lowest`` and every floor is of no interest."""
+        self._level, self._spans, self._lowest = level, spans, lowest
         self._push = play.push_n / level.ball.mass_kg
         self._climb = _CLIMB * level.ball.radius
         self._column = spans.column
@@ -349,8 +349,7 @@ class _Flood:
     def _spread(self, motion: _Motion) -> None:
         """Let the ball roll and fly on from what has been reached."""
         spans, away, cap = self._spans, self.away, self.cap
-        useful = float(spans.floor[self._support].min()) - self._climb
-        useful = min(useful, self._level.finish.at[2] - self._level.finish.size[2])
+        useful = min(float(spans.floor[self._support].min()) - self._climb, self._lowest)
         farthest = int(motion.range(np.array(motion.apex - useful)) / spans.cell) + _NEAR
         # How many columns it can fly before it would come down on each span.
         drop = motion.apex + self._climb - np.where(self._support, spans.floor, -np.inf)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import runpy
 import sys
 from pathlib import Path
@@ -14,7 +13,7 @@ import pytest
 
 from roller_env.cli.level import Preset, look, main, saves
 from roller_env.compile.compiled import level_mjcf
-from roller_env.level import level_json_schema, load_level, shipped_levels
+from roller_env.level import level_json_schema, load_level
 from roller_env.physics.presets import PRESETS
 from tests.level.samples import SMALL
 
@@ -32,7 +31,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_shipped_levels_pass_the_check(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", *shipped_levels(), "--strict"]) == 0
+    assert main(["check", "flat", "gate", "--strict"]) == 0
     assert capsys.readouterr().out == ""
 
 
@@ -45,12 +44,10 @@ def test_all_that_is_wrong_with_all_files_is_said_in_lines_that_editors_read(
     lines = captured.out.splitlines()
     broken = [
         "broken.yaml:4:14: error: finish.at: found a list of 2; allowed: a list of 3 numbers",
-        "broken.yaml:7:14: error: coins[0].at: found the number 3; allowed: a list of 3 numbers",
+        "broken.yaml:7:14: error: coins[0].at: found 3; allowed: a list of 3 numbers",
     ]
     assert lines[:2] == broken
-    assert lines[2].startswith(
-        "high.yaml:7:9: warning: coins[0]: the coin at [0, 0, 400] is out of"
-    )
+    assert lines[2].startswith("high.yaml:7:9: warning: coins[0]: the coin at [0, 0, 400] is out")
     assert lines[3].startswith("none.yaml: error: there is no such file")
     assert lines[4:] == broken
     assert captured.err == "5 levels: 5 errors, 1 warning\n"
@@ -167,7 +164,7 @@ def test_a_save_is_seen_whether_it_is_written_over_or_put_in_place(here: Path) -
     file.unlink()
     other = here / "aside.yaml"
     other.write_text(SMALL)
-    os.replace(other, file)
+    other.replace(file)
     next(seen)
 
 
