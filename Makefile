@@ -51,7 +51,7 @@ play: $(READY) ## play in the browser, on this machine's port 8080
 	@$(BIN)/python scripts/play.py --level $(LEVEL) $(ARGS)
 
 test: $(READY) ## run the tests on all processors
-	@$(BIN)/python -m pytest --numprocesses auto $(ARGS)
+	@$(BIN)/python -m pytest --numprocesses auto --dist loadgroup $(ARGS)
 
 lint: $(READY) ## check style, types and the direction of imports
 	$(BIN)/ruff check .

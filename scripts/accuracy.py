@@ -16,8 +16,16 @@ from pathlib import Path
 import tyro
 from tqdm import tqdm
 
-from roller_env.lab.accuracy import FULL, QUICK, pieces, run, scenes_named, write
-from roller_env.lab.report import answers_section, orders_section
+from roller_env.lab.accuracy import (
+    FULL,
+    QUICK,
+    cheapest_section,
+    orders_section,
+    pieces,
+    run,
+    scenes_named,
+    write,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +55,7 @@ def main(arguments: Arguments) -> None:
         results = run(scenes, effort, progress)
     files = write(results, arguments.out)
     print(orders_section(results))
-    print(answers_section(results))
+    print(cheapest_section(results))
     print(f"{len(files)} files in {arguments.out}; start with {files[-1]}")
 
 

@@ -17,17 +17,16 @@ from typing import Literal
 
 import tyro
 
-from roller_env.lab.benchmark import charts, ratios, report
+from roller_env.lab import chart, table
+from roller_env.lab.benchmark import breakdown, ratios
 from roller_env.lab.benchmark.peers import INTERPRETER, PeerError
-from roller_env.lab.benchmark.race import Pace
-from roller_env.lab.provenance import header, provenance
-from roller_env.lab.tables import write_rows
+from roller_env.lab.runner import Config, header, provenance
 from roller_env.level.errors import LevelError
 from roller_env.training.config import load_config
 from roller_env.training.config_source import ConfigError
 
 _PACKAGES = ("mujoco", "numpy", "gymnasium", "stable-baselines3", "torch")
-_QUICK = Pace(rounds=2, round_s=0.05, warm_up_s=0.5)
+_QUICK = Config(rounds=2, round_s=0.05, warm_up_s=0.5)
 _QUICK_TRAINING = ("num_envs=8", "ppo.rollout_steps=16", "ppo.batch_size=64")
 
 
@@ -48,10 +47,10 @@ class Arguments:
     """Environments of the vectors."""
 
     cores: int = 2
-    """That all contestants may use; as many threads do the physics."""
+    """That all cases may use; as many threads do the physics."""
 
     rounds: int = 9
-    """Turns of every contestant."""
+    """Turns of every case."""
 
     round_s: float = 0.5
     """Length of one turn, about."""
@@ -85,12 +84,13 @@ def main(arguments: Arguments) -> None:
     facts = provenance(_PACKAGES) | {f"peer {k}": v for k, v in measured.versions.items()}
     parts = ratios.profile(task, _say)
     out = arguments.out
-    for name, rows in (("ratios", measured.rows), ("speeds", measured.speeds), ("parts", parts)):
-        write_rows(rows, facts, out / name)
+    for name, rows in (("ratios", measured.goals), ("speeds", measured.speeds), ("parts", parts)):
+        table.write(rows, facts, out / name)
     title = f"{task.num_envs} environments, physics {arguments.physics}, {arguments.cores} cores"
-    charts.draw_goals(measured.rows, f"Speed against its goals: {title}", facts, out / "ratios")
-    charts.draw_parts(parts, "Where the time goes", facts, out / "parts")
-    text = f"{header(facts)}\n\n{report.of_ratios(measured, parts)}"
+    goals = ratios.draw_goals(measured.goals, f"Speed against its goals: {title}")
+    chart.save(goals, facts, out / "ratios")
+    chart.save(breakdown.draw(parts), facts, out / "parts")
+    text = f"{header(facts)}\n\n{ratios.report(measured, parts)}"
     (out / "benchmark.md").write_text(text, encoding="utf-8")
     print(f"\n{text}\nTables and pictures: {out}")
 
@@ -111,7 +111,7 @@ def _task(arguments: Arguments) -> ratios.Task:
     names = ("level", "physics", "reward")
     peers = Path(arguments.peers)
     task = ratios.Task(
-        pace=Pace(arguments.rounds, arguments.round_s, arguments.warm_up_s),
+        config=Config(arguments.rounds, arguments.round_s, arguments.warm_up_s),
         options={name: getattr(arguments, name) for name in names},
         num_envs=arguments.num_envs,
         num_threads=arguments.cores,
@@ -119,7 +119,7 @@ def _task(arguments: Arguments) -> ratios.Task:
         training=load_config(arguments.config, _QUICK_TRAINING if arguments.quick else ()),
         peers=peers if arguments.peers != "none" and peers.exists() else None,
     )
-    return replace(task, pace=_QUICK, num_envs=16, training_envs=2) if arguments.quick else task
+    return replace(task, config=_QUICK, num_envs=16, training_envs=2) if arguments.quick else task
 
 
 if __name__ == "__main__":

@@ -15,15 +15,13 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
+from pandas import concat
 from tqdm import tqdm
 
-from roller_env.lab import style
-from roller_env.lab.parallel import charts, names
-from roller_env.lab.parallel.differences import Remedy, Sample, Verdict
-from roller_env.lab.parallel.experiments import Settings, compare, remedies
-from roller_env.lab.parallel.scenes import BODIES, SCENES
-from roller_env.lab.provenance import header, provenance
-from roller_env.lab.tables import write_rows
+from roller_env.lab import chart, parallel, table
+from roller_env.lab.methods import MUJOCO
+from roller_env.lab.parallel import BODIES, FLIGHTS, Settings
+from roller_env.lab.runner import header, known, provenance
 from roller_env.rigid_body import integrator
 
 _QUICK_S = 0.5
@@ -68,15 +66,20 @@ def settings_of(arguments: Arguments) -> Settings:
     Raises:
         ValueError: when it asks for something that does not exist or does not fit together.
     """
-    scenes = dict(SCENES)
+    flights = dict(FLIGHTS)
     if arguments.keys:
-        scenes["keys"] = replace(scenes["keys"], held=names.parsed_keys(arguments.keys))
-    flown = names.chosen_several("scene", arguments.scene, scenes)
+        keys = parallel.parsed_keys(arguments.keys)
+        flights["keys"] = replace(
+            flights["keys"], acting=replace(flights["keys"].acting, held=keys)
+        )
+    methods = {method.integrator: method for method in MUJOCO}
+    mujocos = known("MuJoCo integrator", arguments.integrator, list(methods))
+    flown = parallel.chosen("scene", arguments.scene, list(flights))
     return Settings(
-        bodies=names.chosen_several("body", arguments.body, BODIES),
-        scenes=tuple(scenes[name] for name in flown),
+        bodies=parallel.chosen("body", arguments.body, list(BODIES)),
+        flights={name: flights[name] for name in flown},
         ours=integrator(arguments.method),
-        mujoco=names.mujoco_method(arguments.integrator),
+        mujoco=next(one for name, one in methods.items() if name == mujocos),
         dt_s=arguments.dt,
         duration_s=_QUICK_S if arguments.quick else arguments.duration,
     )
@@ -86,27 +89,27 @@ def main(settings: Settings, out: Path) -> None:
     """Fly, write and draw."""
     facts = provenance()
     print(header(facts))
-    verdicts: list[Verdict] = []
-    samples: list[Sample] = []
-    mended: list[Remedy] = []
+    verdicts, samples, mended = [], [], []
     for body in settings.bodies:
-        summary, course = compare(settings, body)
-        verdicts += summary
-        samples += course
-        style.save(charts.draw_flights(settings, body, course), facts, out / body)
-    print(f"\nLargest differences between the two:\n\n{charts.verdict_table(verdicts)}")
-    write_rows(verdicts, facts, out / "verdicts")
-    write_rows(samples, facts, out / "differences")
+        summary, course = parallel.compare(settings, body)
+        verdicts.append(summary)
+        samples.append(course)
+        chart.save(parallel.draw_flights(settings, body, course), facts, out / body)
+    every = concat(verdicts, ignore_index=True)
+    print(f"\nLargest differences between the two:\n\n{parallel.verdict_table(every)}")
+    table.write(every, facts, out / "verdicts")
+    table.write(concat(samples, ignore_index=True), facts, out / "differences")
     # On a cube angular velocity is angular momentum over a number in any axes: nothing to mend.
     for body in (name for name in settings.bodies if not BODIES[name].isotropic):
-        tried = tqdm(remedies(settings, body), f"the {body}, other methods", unit="run")
-        of_body = [row for rows in tried for row in rows]
-        mended += of_body
-        style.save(charts.draw_remedies(settings, body, of_body), facts, out / f"{body}_remedies")
+        tried = tqdm(parallel.remedies(settings, body), f"the {body}, other methods", unit="step")
+        of_body = concat(list(tried), ignore_index=True)
+        mended.append(of_body)
+        figure = parallel.draw_remedies(settings, body, of_body)
+        chart.save(figure, facts, out / f"{body}_remedies")
         print(f"\nThe {body}'s largest attitude differences from {settings.mujoco.name}:\n")
-        print(charts.remedy_table(of_body))
+        print(parallel.remedy_table(of_body))
     if mended:
-        write_rows(mended, facts, out / "remedies")
+        table.write(concat(mended, ignore_index=True), facts, out / "remedies")
     print(f"Tables and pictures: {out}")
 
 

@@ -13,16 +13,15 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from pathlib import Path
 
 import tyro
 from tqdm import tqdm
 
-from roller_env.lab.presets import economies, report
+from roller_env.lab.presets import ablations, report
 from roller_env.lab.presets.catalogue import SETTINGS
 from roller_env.lab.presets.results import FULL, QUICK, measure
-from roller_env.lab.provenance import provenance
+from roller_env.lab.runner import known, provenance
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +49,7 @@ def main(arguments: Arguments) -> None:
     if arguments.only:
         effort = replace(effort, settings=_checked(arguments.only))
     rows = measure(effort, _progress)
-    modelled = economies.measure(effort.rounds, effort.boxes, effort.games)
+    modelled = ablations.measure(effort.rounds, effort.boxes, effort.games)
     files = report.write(rows, modelled, provenance(), arguments.out)
     print(*report.summary(rows, modelled), sep="\n")
     print(f"{len(files)} files in {arguments.out}")
@@ -60,10 +59,7 @@ def main(arguments: Arguments) -> None:
 
 def _checked(names: Sequence[str]) -> tuple[str, ...]:
     for name in names:
-        if name not in SETTINGS:
-            near = get_close_matches(name, SETTINGS, n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise ValueError(f"--only: found {name!r}; allowed are {', '.join(SETTINGS)}{hint}")
+        known("setting", name, list(SETTINGS))
     return tuple(dict.fromkeys(names))
 
 

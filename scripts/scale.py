@@ -16,11 +16,9 @@ from typing import Literal
 
 import tyro
 
-from roller_env.lab.benchmark import report, scale
-from roller_env.lab.benchmark.race import Pace
-from roller_env.lab.benchmark.scale_charts import draw_scale
-from roller_env.lab.provenance import header, provenance
-from roller_env.lab.tables import write_rows
+from roller_env.lab import chart, table
+from roller_env.lab.benchmark import scale
+from roller_env.lab.runner import Config, header, provenance
 from roller_env.level.errors import LevelError
 
 _LONG = 10_000_000
@@ -83,15 +81,13 @@ def main(arguments: Arguments) -> None:
     _say("memory")
     memory, memory_goal = scale.measure_memory(task)
     _say(f"long run of {task.leak_steps:,} environment steps")
-    leak = list(scale.measure_leak(task))
-    goals = [boxes_goal, memory_goal, scale.judge_leak(leak)]
+    leak = scale.measure_leak(task)
+    goals = table.frame([boxes_goal, memory_goal, scale.judge_leak(leak)])
     facts, out = provenance(("mujoco", "numpy")), arguments.out
-    write_rows(costs, facts, out / "cost")
-    write_rows(memory, facts, out / "memory")
-    write_rows(leak, facts, out / "long_run")
-    write_rows(goals, facts, out / "goals")
-    draw_scale(costs, memory, leak, facts, out / "scale")
-    text = f"{header(facts)}\n\n{report.of_scale(goals, costs, memory)}"
+    for name, rows in (("cost", costs), ("memory", memory), ("long_run", leak), ("goals", goals)):
+        table.write(rows, facts, out / name)
+    chart.save(scale.draw(costs, memory, leak), facts, out / "scale")
+    text = f"{header(facts)}\n\n{scale.report(goals, costs, memory)}"
     (out / "scale.md").write_text(text, encoding="utf-8")
     print(f"\n{text}\nTables and pictures: {out}")
 
@@ -103,7 +99,7 @@ def _say(what: str) -> None:
 def _task(arguments: Arguments) -> scale.Task:
     names = ("level", "physics", "reward")
     task = scale.Task(
-        pace=Pace(arguments.rounds, arguments.round_s, arguments.warm_up_s),
+        config=Config(arguments.rounds, arguments.round_s, arguments.warm_up_s),
         sizes=scale.Sizes(),
         options={name: getattr(arguments, name) for name in names},
         num_envs=arguments.num_envs,
@@ -112,8 +108,8 @@ def _task(arguments: Arguments) -> scale.Task:
     )
     if not arguments.quick:
         return task
-    pace = Pace(rounds=2, round_s=0.02, warm_up_s=0.2)
-    return replace(task, pace=pace, sizes=_QUICK, num_envs=16, leak_steps=4_000)
+    config = Config(rounds=2, round_s=0.02, warm_up_s=0.2)
+    return replace(task, config=config, sizes=_QUICK, num_envs=16, leak_steps=4_000)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from pathlib import Path
 import tyro
 from tqdm import tqdm
 
-from roller_env.lab.provenance import provenance
+from roller_env.lab.runner import provenance
 from roller_env.lab.stability import run
 from roller_env.lab.stability.cases import FULL, QUICK
 

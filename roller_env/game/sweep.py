@@ -136,7 +136,6 @@ def forget(events: Events, rows: Bool) -> None:
         events.inside,
         events.coins,
         events.plates,
-        events.pads,
         events.triggers,
         events.finished,
         events.fallen,

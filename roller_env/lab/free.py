@@ -20,7 +20,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from roller_env.lab.experiment import Measure
+from roller_env.lab import simulate
 from roller_env.lab.methods import (
     FREE,
     MUJOCO,
@@ -29,9 +29,11 @@ from roller_env.lab.methods import (
     RigidBodyMethod,
     without_warnings,
 )
+from roller_env.lab.scene import Measure
 from roller_env.rigid_body import (
     Body,
     Load,
+    PiecewiseConstantForce,
     State,
     advance,
     constant,
@@ -50,7 +52,7 @@ MOMENTS: Final = 10
 FAILURE: Final = 1.0
 """An error as large as the motion itself (or a radian): nothing is left of the answer."""
 
-_RIGID_BODY_PART_STEPS: Final = 20
+_RIGID_BODY_PART_STEPS: Final = 5000
 _MUJOCO_PART_STEPS: Final = 1000
 """Steps that are timed: some milliseconds, against which starting the clock is nothing."""
 
@@ -72,6 +74,8 @@ class Acting:
     """c of the force -c v."""
     spin_damping_nm_s: float = 0.0
     """c of the torque -c omega."""
+    held: PiecewiseConstantForce | None = None
+    """Keys or a lift: a force that changes by jumps, held through every step."""
 
     def load(self) -> Load:
         """Return it for our integrators; what is zero costs nothing."""
@@ -87,16 +91,27 @@ class Acting:
         return loads[0] if len(loads) == 1 else total(*loads)
 
     def apply(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Let it act on the only body of a compiled model.
+        """Let it act on the only body of a compiled model, but for what is held.
 
         The damping goes into the joint. As a force in ``xfrc_applied`` MuJoCo would hold it through
-        the stages of a Runge-Kutta step, which would then be of first order.
+        the stages of a Runge-Kutta step, which would then be of first order. A free joint's damping
+        acts along body axes in rotation; being the same on every axis it is -c omega in any.
         """
         model.opt.gravity[:] = self.gravity_m_s2
         model.dof_damping[:3] = self.drag_n_s_m
         model.dof_damping[3:] = self.spin_damping_nm_s
         data.xfrc_applied[1, :3] = self.force_n
         data.xfrc_applied[1, 3:] = self.torque_nm
+
+    def hold(self, data: mujoco.MjData, t: float) -> None:
+        """Let what is held at ``t`` act on the only body of a compiled model."""
+        if self.held is not None:
+            data.xfrc_applied[1, :3] = self.held.force_at_time(t) + self.force_n
+
+    @property
+    def jumps_s(self) -> Float64:
+        """Times at which the held force jumps, rising."""
+        return np.empty(0) if self.held is None else self.held.switches_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +191,7 @@ GROWTH: Final = Quantity("growth", "error of the wobble's growth rate, relative"
 
 @dataclass(frozen=True)
 class FreeScene:
-    """A free body with a known motion; a `roller_env.lab.experiment.Scene`."""
+    """A free body with a known motion; a `roller_env.lab.scene.Scene`."""
 
     name: str
     title: str
@@ -193,6 +208,8 @@ class FreeScene:
     failure: float = FAILURE
     limits_s: Mapping[str, float] = field(default_factory=dict)
     """Time step above which theory expects a method to blow up, by its name."""
+    moments: int = MOMENTS
+    """Moments of a run at which the error is taken, evenly to its end."""
 
     @property
     def measures(self) -> Sequence[Measure]:
@@ -206,29 +223,29 @@ class FreeScene:
     @property
     def moment_s(self) -> float:
         """Time between two moments at which errors are taken, which every step must divide, s."""
-        return self.horizon_s / MOMENTS
+        return self.horizon_s / self.moments
 
     @cached_property
     def times_s(self) -> Float64:
-        """The moments at which errors are taken, (MOMENTS,) s."""
-        return np.arange(1.0, MOMENTS + 1.0) * self.moment_s
+        """The moments at which errors are taken, (moments,) s."""
+        return np.arange(1.0, self.moments + 1.0) * self.moment_s
 
     @cached_property
     def truth(self) -> State:
         """The true motion, a row for each moment."""
-        return self.exact(self.start.take([0] * MOMENTS), self.times_s)
+        return self.exact(self.start.take([0] * self.moments), self.times_s)
 
     def steps_to_a_moment(self, dt_s: float) -> int:
         """Return the steps from one moment to the next.
 
         Raises:
-            ValueError: when the time step does not divide the tenth of the horizon.
+            ValueError: when the time step does not divide that time.
         """
         steps = round(self.moment_s / dt_s) if dt_s > 0.0 else 0
         if steps < 1 or not math.isclose(steps * dt_s, self.moment_s, rel_tol=1e-9):
             raise ValueError(
-                f"{self.name}: the time step must divide {self.moment_s:g} s (a tenth of the "
-                f"horizon), found {dt_s:g} s"
+                f"{self.name}: the time step must divide {self.moment_s:g} s (a moment of the "
+                f"{self.moments}), found {dt_s:g} s"
             )
         return steps
 
@@ -236,7 +253,7 @@ class FreeScene:
         """See `Scene.trial`.
 
         Raises:
-            ValueError: when ``dt_s`` does not divide a tenth of the horizon.
+            ValueError: when ``dt_s`` does not divide the time between two moments.
         """
         if isinstance(method, RigidBodyMethod):
             return _RigidBodyTrial(self, method, dt_s)
@@ -244,7 +261,7 @@ class FreeScene:
 
     def over(self, horizon_s: float) -> FreeScene:
         """Return the scene over another time, with those of its time steps that divide that."""
-        moment_s = horizon_s / MOMENTS
+        moment_s = horizon_s / self.moments
         fitting = [dt for dt in self.time_steps_s if dt <= moment_s * (1.0 + 1e-9)]
         return replace(self, horizon_s=horizon_s, time_steps_s=fitting)
 
@@ -258,7 +275,7 @@ class FreeScene:
 
 
 class FreeTrial(ABC):
-    """One run of a free scene; a `roller_env.lab.experiment.SteadyTrial`."""
+    """One run of a free scene; a `roller_env.lab.scene.SteadyTrial`."""
 
     def __init__(self, scene: FreeScene, dt_s: float, part_steps: int) -> None:
         """Prepare a run with steps of ``dt_s`` seconds, of which ``part_steps`` are timed."""
@@ -294,7 +311,7 @@ class _RigidBodyTrial(FreeTrial):
 
     def run(self) -> None:
         state, self._path = self._scene.start, []
-        for moment in range(MOMENTS):
+        for moment in range(self._scene.moments):
             state = self._advanced(state, self._steps, moment * self._steps * self._dt_s)
             self._path.append(state)
 
@@ -304,16 +321,17 @@ class _RigidBodyTrial(FreeTrial):
     def _advanced(self, state: State, steps: int, start_s: float) -> State:
         with np.errstate(all="ignore"):
             return advance(
-                state, self._integrator, self._dt_s, steps, load=self._load, start_s=start_s
+                state,
+                self._integrator,
+                self._dt_s,
+                steps,
+                load=self._load,
+                held=self._scene.acting.held,
+                start_s=start_s,
             )
 
     def reached(self) -> State:
-        return self._scene.start.take([0] * MOMENTS).recalculate(
-            position=np.vstack([one.position for one in self._path]),
-            momentum=np.vstack([one.momentum for one in self._path]),
-            orientation=np.vstack([one.orientation for one in self._path]),
-            angular_momentum=np.vstack([one.angular_momentum for one in self._path]),
-        )
+        return in_rows(self._path)
 
 
 class _MujocoTrial(FreeTrial):
@@ -323,24 +341,30 @@ class _MujocoTrial(FreeTrial):
         super().__init__(scene, dt_s, _MUJOCO_PART_STEPS)
         self._model = free_model(scene.start.body, method, dt_s)
         self._data = mujoco.MjData(self._model)
-        self._qpos = np.empty((MOMENTS, 7))
-        self._qvel = np.empty((MOMENTS, 6))
+        self._path: simulate.Path | None = None
 
     def _begin(self) -> None:
-        start, data = self._scene.start, self._data
+        data, acting = self._data, self._scene.acting
         mujoco.mj_resetData(self._model, data)
-        self._scene.acting.apply(self._model, data)
-        data.qpos[:3], data.qpos[3:] = start.position[0], start.orientation[0]
-        data.qvel[:3] = start.velocity[0]
-        # MuJoCo keeps a free joint's angular velocity in the body's frame.
-        data.qvel[3:] = quaternion.rotate_inverse(start.orientation, start.angular_velocity)[0]
+        acting.apply(self._model, data)
+        acting.hold(data, 0.0)
+        (data.qpos[:],), (data.qvel[:],) = to_mujoco(self._scene.start)
 
     def run(self) -> None:
         self._begin()
+        total = self._steps * self._scene.moments
+        # A force that is held has to be looked up in every step, which only keys are worth.
+        held = self._scene.acting.held is not None
         with without_warnings():
-            for moment in range(MOMENTS):
-                mujoco.mj_step(self._model, self._data, self._steps)
-                self._qpos[moment], self._qvel[moment] = self._data.qpos, self._data.qvel
+            path = simulate.record(
+                self._model,
+                self._data,
+                total,
+                every=1 if held else self._steps,
+                before=lambda step: self._scene.acting.hold(self._data, step * self._dt_s),
+            )
+        at = slice(self._steps, None, self._steps) if held else slice(1, None)
+        self._path = simulate.Path(path.time[at], path.qpos[at], path.qvel[at])
 
     def run_part(self) -> None:
         self._begin()
@@ -348,14 +372,43 @@ class _MujocoTrial(FreeTrial):
             mujoco.mj_step(self._model, self._data, self._part_steps)
 
     def reached(self) -> State:
-        rows = self._scene.start.take([0] * MOMENTS)
-        q = quaternion.normalise(self._qpos[:, 3:])
-        return rows.recalculate(
-            position=self._qpos[:, :3],
-            momentum=rows.body.mass[:, None] * self._qvel[:, :3],
-            orientation=q,
-            angular_momentum=quaternion.rotate(q, rows.body.inertia * self._qvel[:, 3:]),
+        assert self._path is not None, "run first"
+        return from_mujoco(self._scene.start, self._path.qpos, self._path.qvel)
+
+
+def in_rows(states: Sequence[State]) -> State:
+    """Return one body's states, one after the other, as the rows of a state."""
+    return (
+        states[0]
+        .take([0] * len(states))
+        .recalculate(
+            position=np.vstack([one.position for one in states]),
+            momentum=np.vstack([one.momentum for one in states]),
+            orientation=np.vstack([one.orientation for one in states]),
+            angular_momentum=np.vstack([one.angular_momentum for one in states]),
         )
+    )
+
+
+def to_mujoco(state: State) -> tuple[Float64, Float64]:
+    """Return a free joint's ``qpos`` (N, 7) and ``qvel`` (N, 6).
+
+    Its velocity is in world axes and its angular velocity in body axes, m/s and rad/s.
+    """
+    spin = quaternion.rotate_inverse(state.rotation, state.angular_velocity)
+    return np.hstack([state.position, state.rotation]), np.hstack([state.velocity, spin])
+
+
+def from_mujoco(start: State, qpos: Float64, qvel: Float64) -> State:
+    """Return ``start``'s first body where a free joint has ``qpos`` (N, 7), ``qvel`` (N, 6)."""
+    rows = start.take([0] * len(qpos))
+    q = quaternion.normalise(qpos[:, 3:])
+    return rows.recalculate(
+        position=qpos[:, :3],
+        momentum=rows.body.mass[:, None] * qvel[:, :3],
+        orientation=q,
+        angular_momentum=quaternion.rotate(q, rows.body.inertia * qvel[:, 3:]),
+    )
 
 
 def free_model(body: Body, method: MujocoMethod, dt_s: float) -> mujoco.MjModel:

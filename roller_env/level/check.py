@@ -13,7 +13,13 @@ from typing import Final
 
 import numpy as np
 
-from roller_env.level.expand import TOUCHING_M, Float64, Solid, coin_positions, rotation_matrix
+from roller_env.level.expand import (
+    TOUCHING_M,
+    Float64,
+    Solid,
+    coin_positions,
+    rotation_matrix,
+)
 from roller_env.level.schema import (
     BUILT_IN_MATERIALS,
     MAX_COINS,
@@ -87,8 +93,8 @@ def obstructions(level: Level, blocks: Sequence[Solid], positions: Float64) -> d
         For the index of each position that is not free, the field of the level that is there.
     """
     margin = max(level.ball.radius - TOUCHING_M, 0.0)
-    held = inside(blocks, positions, margin)
-    return {int(index): block.source for block, indices in held for index in indices}
+    found = inside(blocks, positions, margin)
+    return {int(index): block.source for block, indices in found for index in indices}
 
 
 def _totals(level: Level) -> Iterator[Problem]:

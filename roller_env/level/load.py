@@ -224,6 +224,8 @@ def _unit(root: Node) -> Unit:
 
 def _placed(problem: Problem, root: Node, filename: str) -> Problem:
     line, column = root.position(problem.path)
+    if line == 0:  # plain data, not a text
+        return problem
     return replace(problem, filename=filename, line=line, column=column)
 
 

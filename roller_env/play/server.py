@@ -7,7 +7,13 @@ the same browser, cannot reach the game either.
 
 Of the browsers that watch, Studio lets each take the controls from the one that has them ("Steal
 control" in its bar). Here that is not heard: they can ask, and are next when the player gives the
-controls up or is gone. (Read and tried with MuJoCo 4.0.0.)
+controls up or is gone.
+
+Panels are sent as changes, of which a page can leave none out, 60 times a second, and it takes a
+bounded number of them for each picture that it draws. A page that draws slowly, as where software
+draws beside other work, falls ever further behind: after 15 s in which it drew nothing, its panels
+came right with the 44th picture. Here the page says when the next ones are due: it tells its keys
+once for every picture. (Read and tried with MuJoCo 4.0.0.)
 """
 
 from __future__ import annotations
@@ -17,6 +23,7 @@ import functools
 import re
 import socket
 import sys
+import threading
 from collections.abc import AsyncIterator, Callable, Sequence
 from typing import Any, Final
 
@@ -46,6 +53,10 @@ NATIVE_NOTE: Final = (
     "note: MuJoCo 4.0.0's window shows the level but, where it was tried, neither panels nor sky; "
     "Enter starts the game. The page (--viewer web) shows all of it."
 )
+
+STALE_PAGE_S: Final = 0.1
+"""How often a page that draws nothing is sent what is new: so seldom that it can catch up, and more
+often than the game lets go of keys of which it hears nothing."""
 
 Plugins = Sequence[plugin.Plugin]
 
@@ -107,8 +118,16 @@ def open_page(
             """Studio wants all interfaces, without asking: no."""
 
         def _start_server(self) -> None:
-            web_server.serve = _serving(web_server._SessionMessage.FORCE_CONTROL, origins)
+            self._page_drew = threading.Event()
+            taking = web_server._SessionMessage.FORCE_CONTROL
+            web_server.serve = _serving(taking, self._page_drew.set, origins)
             super()._start_server()
+
+        def prepare_next_frame(self) -> bool:
+            """Wait for the page, but not for long."""
+            self._page_drew.wait(STALE_PAGE_S)
+            self._page_drew.clear()
+            return bool(super().prepare_next_frame())
 
     def view(config: Any, endpoint: Any, viewers: Any) -> None:
         viewer_protocol.run_viewer_loop(PageViewer(config, endpoint, plugins=viewers))
@@ -195,11 +214,12 @@ def _launch(
     )
 
 
-def _serving(taking: str, origins: Sequence[Any] | None) -> Any:
+def _serving(taking: str, page_drew: Callable[[], None], origins: Sequence[Any] | None) -> Any:
     """Return what serves WebSockets in the place of `websockets`' own ``serve``.
 
     Args:
         taking: the message by which a browser takes the controls from another one.
+        page_drew: called when the player's page has drawn a picture.
         origins: of the pages that are let in; None for any.
     """
     from websockets.asyncio.server import ServerConnection, serve
@@ -212,5 +232,12 @@ def _serving(taking: str, origins: Sequence[Any] | None) -> Any:
             async for message in super().__aiter__():
                 if message != taking:
                     yield message
+                if isinstance(message, bytes) and self.is_of_panels:
+                    page_drew()
+
+        @property
+        def is_of_panels(self) -> bool:
+            """Whether it is the player's, which tells keys and is sent panels."""
+            return self.request is not None and self.request.path.startswith("/ui")
 
     return functools.partial(serve, origins=origins, create_connection=Seat)

@@ -1,4 +1,4 @@
-"""The report's rigid body, as a library of its own: NumPy, no MuJoCo, many bodies at a time.
+"""The report's rigid body, as a library of its own: NumPy and Numba, many bodies at a time.
 
     >>> from roller_env.rigid_body import RK4, Body, State, advance, driving_torque
     >>> cube = State.create(Body.cube(size=1.0, mass=1.0))
@@ -7,8 +7,9 @@
     [[9.975, 0.0, 0.0]]
 
 Modules: `state` (primary, secondary and constant values), `quaternion`, `forces`, `integrators`,
-`exact` (motions with a known answer, the only one that needs SciPy), `pacing` (fixed steps under
-frames of any length, drawing between them), `axes` (the report's axes and the game's).
+`kernels` (what of these two is compiled), `exact` (motions with a known answer, the only one that
+needs SciPy), `pacing` (fixed steps under frames of any length, drawing between them), `axes` (the
+report's axes and the game's).
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ from roller_env.rigid_body.integrators import (
     INTEGRATORS,
     LIE_RK4,
     RK4,
+    RK4_BODY,
     SEMI_IMPLICIT_EULER,
     SPLITTING2,
     SPLITTING4,
@@ -59,6 +61,7 @@ __all__ = [
     "OPENGL_TO_GAME",
     "REPORT_TO_GAME",
     "RK4",
+    "RK4_BODY",
     "SEMI_IMPLICIT_EULER",
     "SPLITTING2",
     "SPLITTING4",

@@ -22,7 +22,17 @@ from scipy.integrate import DOP853
 from scipy.special import ellipj, ellipkinc, ellipkm1, elliprf, elliprj
 
 from roller_env.rigid_body import quaternion
-from roller_env.rigid_body.arrays import Float64, cross, dot, non_negative, positive, rows, scalars
+from roller_env.rigid_body.arrays import (
+    Float64,
+    cross,
+    dot,
+    finite_number,
+    non_negative,
+    positive,
+    rows,
+    scalars,
+    scale_exponent,
+)
 from roller_env.rigid_body.forces import (
     DerivativeFunction,
     Load,
@@ -31,7 +41,7 @@ from roller_env.rigid_body.forces import (
     none,
     total,
 )
-from roller_env.rigid_body.state import Body, State
+from roller_env.rigid_body.state import State
 
 _EQUAL_INERTIA = 1e-12
 """Relative difference under which two moments of inertia are the same."""
@@ -120,14 +130,20 @@ def constant_spin(state: State, t_s: npt.ArrayLike) -> State:
     """
     t = _column(state, t_s)
     omega, momentum = state.angular_velocity, state.angular_momentum
-    sine = quaternion.norm(cross(omega, momentum))
-    if (sine > _PARALLEL * quaternion.norm(omega) * quaternion.norm(momentum)).any():
+    if not _parallel(omega, momentum):
         raise ValueError(
             "constant_spin needs bodies that spin about a principal axis; "
             "use symmetric_top or asymmetric_top"
         )
     turn = quaternion.from_rotation_vector(omega * t)
     return state.recalculate(orientation=quaternion.multiply(turn, state.orientation))
+
+
+def _parallel(a: Float64, b: Float64) -> bool:
+    """Say whether every row of ``a`` has the line of its row of ``b``; a zero has any line."""
+    a, b = (np.ldexp(v, -scale_exponent(v)[:, None]) for v in (a, b))
+    sine = quaternion.norm(cross(a, b))
+    return not (sine > _PARALLEL * quaternion.norm(a) * quaternion.norm(b)).any()
 
 
 def damped_spin(
@@ -154,8 +170,7 @@ def damped_spin(
     if not state.body.isotropic:
         raise ValueError("damped_spin needs three equal moments of inertia; use reference")
     momentum = state.angular_momentum
-    across = quaternion.norm(cross(momentum, drive))
-    if (across > _PARALLEL * quaternion.norm(momentum) * quaternion.norm(drive)).any():
+    if not _parallel(momentum, drive):
         raise ValueError("damped_spin needs a spin along the torque, or none; use reference")
     gained, turned = _relaxed(momentum, drive, c * state.body.inverse_inertia, t)
     turn = quaternion.from_rotation_vector(state.body.inverse_inertia * turned)
@@ -205,13 +220,14 @@ def middle_axis_growth_rate(inertia: npt.ArrayLike, spin_rad_s: float) -> float:
         spin_rad_s: w.
 
     Raises:
-        ValueError: when there are not three positive moments.
+        ValueError: when there are not three positive moments, or the spin is no number.
     """
-    moments = positive("inertia", inertia)
+    moments, spin = positive("inertia", inertia), abs(finite_number("spin_rad_s", spin_rad_s))
     if moments.shape != (3,):
         raise ValueError(f"inertia must have shape (3,), got {moments.shape}")
     low, middle, high = np.sort(moments)
-    return float(abs(spin_rad_s) * np.sqrt((middle - low) * (high - middle) / (low * high)))
+    # Two roots, since a product of moments may be out of range.
+    return float(spin * np.sqrt((middle - low) / low) * np.sqrt((high - middle) / high))
 
 
 def asymmetric_top(state: State, t_s: npt.ArrayLike) -> State:
@@ -245,7 +261,13 @@ class _Top(NamedTuple):
     """Free asymmetric tops in axes of their own, ordered so that omega_3 never changes sign.
 
     omega = (a cn u, a slope sn u, c dn u) with u = rate * t + u_0. Arrays are (N,) unless said.
+
+    Time and inertia are in units of powers of two in which spin and inertia are about 1, so that
+    their squares are floats for bodies of any size that spin at any speed.
     """
+
+    time_unit: npt.NDArray[np.intc]
+    """e: a second is 2^e of these."""
 
     axes: npt.NDArray[np.intp]
     """(N, 3): the body axis that each of these axes is."""
@@ -273,9 +295,12 @@ class _Top(NamedTuple):
         """
         momentum = quaternion.rotate_inverse(state.rotation, state.angular_momentum)
         spin = momentum * state.body.inverse_inertia
-        axes, signs = _upright_axes(state.body, spin)
+        of_time, of_inertia = scale_exponent(spin), scale_exponent(state.body.inertia)
+        spin = np.ldexp(spin, -of_time[:, None])
+        moments = np.ldexp(state.body.inertia, -of_inertia[:, None])
+        axes, signs = _upright_axes(state.body.axes_by_inertia, moments, spin)
         w1, w2, w3 = (np.take_along_axis(spin, axes, axis=1) * signs).T
-        inertia = np.take_along_axis(state.body.inertia, axes, axis=1)
+        inertia = np.take_along_axis(moments, axes, axis=1)
         i1, i2, i3 = inertia.T
         # Amplitudes as sums of terms of one sign, so that nothing cancels.
         a = np.sqrt(w1**2 + w2**2 * i2 * (i2 - i3) / (i1 * (i1 - i3)))
@@ -292,11 +317,12 @@ class _Top(NamedTuple):
                 f"axis): 1 - m is {complement.min():.1e}, below {_SEPARATRIX}; use reference"
             )
         amplitude = np.arctan2(np.divide(w2, slope, out=np.zeros_like(w2), where=c != 0.0), w1)
-        length = quaternion.norm(momentum)
-        return cls(axes, signs, inertia, length, a, slope, c, rate, complement, amplitude)
+        size = np.ldexp(quaternion.norm(momentum), -of_time - of_inertia)
+        return cls(of_time, axes, signs, inertia, size, a, slope, c, rate, complement, amplitude)
 
     def at(self, t: Float64) -> Float64:
-        """Return the orientations at ``t`` (N,), body to a frame with the momentum along z."""
+        """Return the orientations at ``t`` (N,) s, body to a frame with the momentum along z."""
+        t = np.ldexp(t, self.time_unit)
         i1, i2, i3 = self.inertia.T
         parameter, half_period = 1.0 - self.complement, 2.0 * ellipkm1(self.complement)
         u = self.rate * t + ellipkinc(self.amplitude, parameter)
@@ -317,10 +343,11 @@ class _Top(NamedTuple):
         return quaternion.multiply(_about(2, precession), tilted)
 
 
-def _upright_axes(body: Body, spin: Float64) -> tuple[npt.NDArray[np.intp], Float64]:
+def _upright_axes(
+    order: npt.NDArray[np.intp], inertia: Float64, spin: Float64
+) -> tuple[npt.NDArray[np.intp], Float64]:
     """Return the axes and signs of `_Top` for body-frame angular velocities (N, 3)."""
-    order = body.axes_by_inertia
-    low, middle, high = np.take_along_axis(body.inertia, order, axis=1).T
+    low, middle, high = np.take_along_axis(inertia, order, axis=1).T
     if (np.minimum(middle - low, high - middle) < _DISTINCT_INERTIA * high).any():
         raise ValueError(
             "asymmetric_top needs three different moments; use symmetric_top or reference"
@@ -391,9 +418,11 @@ def reference(
         start_s: time of ``state``.
 
     Raises:
-        ValueError: a duration that is negative or no number, or a motion the method cannot follow.
+        ValueError: a duration that is negative or no finite number, a load that does not fit the
+            bodies, or a motion the method cannot follow.
     """
-    duration = float(non_negative("t_s", t_s))
+    duration, start_s = finite_number("t_s", t_s), finite_number("start_s", start_s)
+    non_negative("t_s", duration)
     end = start_s + duration
     switches = [] if held is None else [float(t) for t in held.switches_s if start_s < t < end]
     for begin, stop in itertools.pairwise([start_s, *switches, end]):

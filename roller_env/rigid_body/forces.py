@@ -1,10 +1,17 @@
 """Forces and torques on rigid bodies, and the derivative that an integrator follows.
 
 A **load** is a function ``(state, t) -> Wrench``: it may depend on the state and on the time.
-`total` adds loads, `derivative_of` makes of a load what the integrators take. What a player
-holds (keys, a lift) changes by jumps, which no method of high order can follow inside a step:
-it is a function of time alone, sampled at the beginning of a step and held through it (`held`),
-just as MuJoCo holds ``ctrl`` and ``xfrc_applied``.
+What it returns is a force and a torque for **each** body, two arrays (N, 3): whoever calls a load
+(`total`, `on_axle`, the integrators) has `checked` it, and nothing is stretched to fit. A plain
+pair of nested lists will do as well.
+
+The loads made here are compiled (`BuiltInLoad`), and their sums and axles too; one of your own is
+an ordinary function, and costs a call of Python for each stage of a step.
+
+`total` adds loads, `derivative_of` makes of a load what the integrators take. What a player holds
+(keys, a lift) changes by jumps, which no method of high order can follow inside a step: it is a
+function of time alone, sampled at the beginning of a step and held through it (`held`), just as
+MuJoCo holds ``ctrl`` and ``xfrc_applied``.
 
 SI units, world frame, torques about the centre of mass.
 
@@ -16,23 +23,28 @@ velocity at p as v + omega * (p - x), a product of two vectors which lost its cr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.rigid_body import quaternion
+from roller_env.rigid_body import kernels
 from roller_env.rigid_body.arrays import (
     Float64,
     cross,
+    direction,
     dot,
+    finite_number,
     fitting_column,
     fitting_rows,
+    floats,
     non_negative,
     numbers,
     read_only,
+    row_or_rows,
     rows,
 )
 from roller_env.rigid_body.state import State
@@ -66,6 +78,37 @@ class Wrench(NamedTuple):
 
 Load = Callable[[State, float], Wrench]
 """What acts on the bodies in a state at a time, s."""
+
+
+def checked(load: Load, state: State, t: float) -> Wrench:
+    """Return what ``load`` gives, float64 (N, 3) and (N, 3), or refuse it.
+
+    The numbers themselves are not checked: a motion that blew up has infinite forces.
+
+    Raises:
+        ValueError: when it is no pair, or a half is not real numbers of the shape (N, 3).
+    """
+    given = load(state, t)
+    if not isinstance(given, (tuple, list)) or len(given) != len(Wrench._fields):
+        raise ValueError(
+            f"a load must return a Wrench, which is a force and a torque, got {given!r}"
+        )
+    return Wrench(
+        *(
+            _for_each_body(name, value, state.count)
+            for name, value in zip(Wrench._fields, given, strict=True)
+        )
+    )
+
+
+def _for_each_body(name: str, value: npt.ArrayLike, count: int) -> Float64:
+    of_load = f"the load's {name}"
+    array = value
+    if not (isinstance(array, np.ndarray) and array.dtype == np.float64):
+        array = floats(of_load, value)
+    if array.shape != (count, 3):
+        raise ValueError(f"{of_load} must have shape ({count}, 3), got {array.shape}")
+    return array
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,54 +156,112 @@ def derivative_of(load: Load) -> DerivativeFunction:
     """Return the derivative under ``load``.
 
     Raises:
-        ValueError: from the returned function, when the load gives another shape than (N, 3).
+        ValueError: from the returned function, as `checked`.
     """
 
     def derivative(state: State, t: float) -> Derivative:
-        wrench = load(state, t)
-        for name, value in zip(Wrench._fields, wrench, strict=True):
-            if np.shape(value) != (state.count, 3):
-                raise ValueError(
-                    f"the load's {name} must have shape ({state.count}, 3), got {np.shape(value)}"
-                )
-        return Derivative(state, wrench)
+        return Derivative(state, checked(load, state, t))
 
     return derivative
 
 
-def none(state: State, t: float) -> Wrench:
-    """Return no force and no torque: the load of a free body."""
-    zero = np.zeros((state.count, 3))
-    return Wrench(zero, zero)
+@dataclass(frozen=True, eq=False)
+class _Term:
+    """One built-in load before the number of bodies is known; see `kernels.Terms`."""
+
+    kind: int
+    a: tuple[str, Float64] = ("a", np.zeros(3))
+    b: tuple[str, Float64] = ("b", np.zeros(3))
+    c: tuple[str, Float64] = ("c", np.zeros(()))
+    axles: tuple[Float64, ...] = ()
+    """Unit vectors, (3,) or (N, 3), in the order in which the torque meets them."""
+
+    def axle(self, count: int) -> Float64:
+        """Return what of a torque the axles let through, (N, 3, 3)."""
+        through = np.broadcast_to(np.eye(3), (count, 3, 3))
+        for unit in self.axles:
+            along = np.broadcast_to(fitting_rows("axis", unit, count, 3), (count, 3))
+            through = np.einsum("ni,nj,njk->nik", along, along, through)
+        return through
+
+
+class BuiltInLoad:
+    """A sum of the loads of this module, which compiled loops evaluate; a `Load` like any other.
+
+    Loads of the user's own are Python, and so is every sum that one of them is part of: an
+    integration then goes back to Python for each stage of each step.
+    """
+
+    def __init__(self, terms: tuple[_Term, ...] = ()) -> None:
+        """Take the terms; the functions of this module make them."""
+        self._terms = terms
+        self._packed: dict[int, kernels.Terms] = {}
+
+    def __call__(self, state: State, t: float) -> Wrench:
+        """Return what acts on the bodies; none of these depends on the time."""
+        wrench = Wrench(np.empty((state.count, 3)), np.empty((state.count, 3)))
+        terms = self.terms(state.count)
+        constants = state.body.constants
+        kernels.wrenches(constants, terms, state.normalised, state.rows(), *wrench)
+        return wrench
+
+    def __add__(self, other: BuiltInLoad) -> BuiltInLoad:
+        """Return both together."""
+        return BuiltInLoad(self._terms + other._terms)
+
+    def through_axle(self, unit: Float64) -> BuiltInLoad:
+        """Return it as it acts on bodies that an axle along ``unit``, (3,) or (N, 3), holds."""
+        return BuiltInLoad(tuple(replace(one, axles=(*one.axles, unit)) for one in self._terms))
+
+    def terms(self, count: int) -> kernels.Terms:
+        """Return what compiled loops take, for ``count`` bodies.
+
+        Raises:
+            ValueError: when it was made for another number of bodies.
+        """
+        if count not in self._packed:
+            self._packed = {count: self._pack(count)}
+        return self._packed[count]
+
+    def _pack(self, count: int) -> kernels.Terms:
+        size = len(self._terms)
+        c, a, b = (np.zeros((size, count, *width)) for width in ((), (3,), (3,)))
+        axle = np.zeros((size, count, 3, 3))
+        for i, one in enumerate(self._terms):
+            c[i] = fitting_column(*one.c, count)[..., 0]
+            a[i], b[i] = fitting_rows(*one.a, count, 3), fitting_rows(*one.b, count, 3)
+            axle[i] = one.axle(count)
+        kind = np.array([one.kind for one in self._terms], dtype=np.int64)
+        held = np.array([bool(one.axles) for one in self._terms], dtype=np.bool_)
+        return kernels.Terms(kind, c, a, b, held, axle)
+
+
+none: Final = BuiltInLoad()
+"""No force and no torque: the load of a free body."""
 
 
 def total(*loads: Load) -> Load:
     """Return the load that is the sum of ``loads``; of none, no load."""
+    built_in = [one for one in loads if isinstance(one, BuiltInLoad)]
+    if len(built_in) == len(loads):
+        return sum(built_in, none)
 
     def load(state: State, t: float) -> Wrench:
         wrench = none(state, t)
         for one in loads:
-            added = one(state, t)
+            added = checked(one, state, t)
             wrench = Wrench(wrench.force + added.force, wrench.torque + added.torque)
         return wrench
 
-    return load if loads else none
+    return load
 
 
 def constant(
     force: npt.ArrayLike = (0.0, 0.0, 0.0), torque: npt.ArrayLike = (0.0, 0.0, 0.0)
 ) -> Load:
     """Return a force, N, and a torque, N m, that never change; each (3,) or (N, 3)."""
-    force_n, torque_nm = numbers("force", force), numbers("torque", torque)
-
-    def load(state: State, _t: float) -> Wrench:
-        still = np.zeros((state.count, 3))
-        return Wrench(
-            still + fitting_rows("force", force_n, state.count, 3),
-            still + fitting_rows("torque", torque_nm, state.count, 3),
-        )
-
-    return load
+    force_n, torque_nm = row_or_rows("force", force, 3), row_or_rows("torque", torque, 3)
+    return BuiltInLoad((_Term(kernels.CONSTANT, ("force", force_n), ("torque", torque_nm)),))
 
 
 def gravity(acceleration: npt.ArrayLike) -> Load:
@@ -168,24 +269,14 @@ def gravity(acceleration: npt.ArrayLike) -> Load:
 
     The report's up is y and the game's is z, so there is no default.
     """
-    field = numbers("acceleration", acceleration)
-
-    def load(state: State, _t: float) -> Wrench:
-        weight = state.body.mass[:, None] * fitting_rows("acceleration", field, state.count, 3)
-        return Wrench(weight, np.zeros_like(weight))
-
-    return load
+    field = row_or_rows("acceleration", acceleration, 3)
+    return BuiltInLoad((_Term(kernels.GRAVITY, ("acceleration", field)),))
 
 
 def linear_drag(coefficient: npt.ArrayLike) -> Load:
     """Return the force -c v, with c in N s/m, one number or (N,), not negative."""
     c = non_negative("coefficient", coefficient)
-
-    def load(state: State, _t: float) -> Wrench:
-        force = -fitting_column("coefficient", c, state.count) * state.velocity
-        return Wrench(force, np.zeros_like(force))
-
-    return load
+    return BuiltInLoad((_Term(kernels.DRAG, c=("coefficient", c)),))
 
 
 def driving_torque(torque: npt.ArrayLike = (1.0, 0.0, 0.0), damping: npt.ArrayLike = 0.1) -> Load:
@@ -198,14 +289,8 @@ def driving_torque(torque: npt.ArrayLike = (1.0, 0.0, 0.0), damping: npt.ArrayLi
         torque: N m, (3,) or (N, 3), world frame.
         damping: N m s, one number or (N,), not negative.
     """
-    drive, c = numbers("torque", torque), non_negative("damping", damping)
-
-    def load(state: State, _t: float) -> Wrench:
-        resisting = fitting_column("damping", c, state.count) * state.angular_velocity
-        moment = fitting_rows("torque", drive, state.count, 3) - resisting
-        return Wrench(np.zeros_like(moment), moment)
-
-    return load
+    drive, c = row_or_rows("torque", torque, 3), non_negative("damping", damping)
+    return BuiltInLoad((_Term(kernels.DRIVE, ("torque", drive), c=("damping", c)),))
 
 
 def force_at(state: State, force: npt.ArrayLike, point: npt.ArrayLike) -> Wrench:
@@ -235,17 +320,9 @@ def push_at(force: npt.ArrayLike, body_point: npt.ArrayLike, *, in_body: bool = 
         in_body: whether the force turns with the body, as a thruster's does. Otherwise it keeps
             its direction in the world.
     """
-    push, point = numbers("force", force), numbers("body_point", body_point)
-
-    def load(state: State, _t: float) -> Wrench:
-        still = np.zeros((state.count, 3))
-        acting = still + fitting_rows("force", push, state.count, 3)
-        if in_body:
-            acting = quaternion.rotate(state.rotation, acting)
-        at = fitting_rows("body_point", point, state.count, 3)
-        return Wrench(acting, cross(quaternion.rotate(state.rotation, at), acting))
-
-    return load
+    push, point = row_or_rows("force", force, 3), row_or_rows("body_point", body_point, 3)
+    kind = kernels.THRUST if in_body else kernels.PUSH
+    return BuiltInLoad((_Term(kind, ("force", push), ("body_point", point)),))
 
 
 def on_axle(load: Load, axis: npt.ArrayLike) -> Load:
@@ -262,15 +339,13 @@ def on_axle(load: Load, axis: npt.ArrayLike) -> Load:
     Raises:
         ValueError: on an axis of length 0 or of a wrong shape.
     """
-    direction = numbers("axis", axis)
-    length = np.sqrt(dot(direction, direction))
-    if (length == 0.0).any():
-        raise ValueError("axis must not be the zero vector: it has no direction")
-    unit = direction / length[..., None]
+    unit = direction("axis", row_or_rows("axis", axis, 3))
+    if isinstance(load, BuiltInLoad):
+        return load.through_axle(unit)
 
     def held_load(state: State, t: float) -> Wrench:
         along = fitting_rows("axis", unit, state.count, 3)
-        wrench = load(state, t)
+        wrench = checked(load, state, t)
         return Wrench(np.zeros_like(wrench.force), dot(wrench.torque, along)[:, None] * along)
 
     return held_load
@@ -316,12 +391,21 @@ class PiecewiseConstantForce:
 
     def force_at_time(self, t: float) -> Float64:
         """Return the force at t, (3,) or (N, 3) N; at a switch, the new one."""
+        t = finite_number("t", t)
         index = int(np.searchsorted(self.switches_s, t + SWITCH_SLACK_S, side="right")) - 1
         return self.forces[index] if index >= 0 else np.zeros_like(self.forces[0])
 
     def held(self, t: float) -> Load:
         """Return the force at t as a load that keeps it whatever the time."""
         return constant(force=self.force_at_time(t))
+
+    def pieces(self, start_s: float, dt: float, steps: int) -> Iterator[range]:
+        """Yield the runs of steps that begin under the same force, together 0 to ``steps`` - 1."""
+        begin = start_s + dt * np.arange(steps) + SWITCH_SLACK_S
+        index = np.searchsorted(self.switches_s, begin, side="right")
+        edges = [0, *(np.flatnonzero(np.diff(index)) + 1).tolist(), steps]
+        for first, end in itertools.pairwise(edges):
+            yield range(first, end)
 
 
 def key_sequence(

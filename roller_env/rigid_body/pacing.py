@@ -17,11 +17,15 @@ from dataclasses import dataclass, field
 import numpy.typing as npt
 
 from roller_env.rigid_body import quaternion
-from roller_env.rigid_body.arrays import positive_time, scalars
+from roller_env.rigid_body.arrays import number, positive_time, scalars, whole
 from roller_env.rigid_body.state import Pose
 
 _ROUNDING = 1e-9
 """Fraction of a step that may be missing from a whole one: sums of frame lengths are rounded."""
+
+
+_UNCOUNTABLE = 2.0**53
+"""Steps beyond which a float64 has no fraction of a step left, if it is a number at all."""
 
 
 @dataclass
@@ -45,8 +49,7 @@ class FixedStepPacer:
 
     def __post_init__(self) -> None:
         positive_time("step_s", self.step_s)
-        if self.max_steps < 1:
-            raise ValueError(f"max_steps must be at least 1, got {self.max_steps}")
+        whole("max_steps", self.max_steps, 1)
 
     def advance(self, frame_s: float) -> int:
         """Return how many steps to take for a frame of ``frame_s`` seconds, 0 to ``max_steps``.
@@ -54,10 +57,15 @@ class FixedStepPacer:
         Raises:
             ValueError: when the frame's length is negative or no finite number.
         """
-        if not (math.isfinite(frame_s) and frame_s >= 0.0):
+        if not (math.isfinite(number("frame_s", frame_s)) and frame_s >= 0.0):
             raise ValueError(f"frame_s must be a number of seconds, not negative, got {frame_s}")
         self._left_s += frame_s
-        wanted = math.floor(self._left_s / self.step_s + _ROUNDING)
+        in_steps = self._left_s / self.step_s + _ROUNDING
+        if in_steps >= _UNCOUNTABLE:
+            self.dropped_s += self._left_s - self.max_steps * self.step_s
+            self._left_s = 0.0
+            return self.max_steps
+        wanted = math.floor(in_steps)
         steps = min(wanted, self.max_steps)
         self._left_s = max(self._left_s - wanted * self.step_s, 0.0)
         self.dropped_s += (wanted - steps) * self.step_s

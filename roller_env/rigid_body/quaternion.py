@@ -19,7 +19,15 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.rigid_body.arrays import Float64, cross, dot, numbers
+from roller_env.rigid_body.arrays import (
+    Float64,
+    cross,
+    direction,
+    length,
+    numbers,
+    plain_squares,
+    scale_exponent,
+)
 
 UNIT_TOLERANCE: Final = 1e-3
 """How far from 1 the norm of a quaternion written by a person may be (0.7071 is 1e-5 off)."""
@@ -61,13 +69,19 @@ def conjugate(q: Float64) -> Float64:
 
 
 def norm(q: Float64) -> Float64:
-    """Return the norms, (...)."""
-    return np.sqrt(dot(q, q))
+    """Return the norms, (...), of quaternions or vectors of any magnitude."""
+    return length(q)
 
 
 def normalise(q: Float64) -> Float64:
     """Return q scaled to norm 1. A zero or non-finite quaternion gives NaN, never an error."""
-    return q / norm(q)[..., None]
+    size = norm(q)
+    if plain_squares(size):
+        return q / size[..., None]
+    with np.errstate(invalid="ignore"):
+        scaled = np.ldexp(q, -scale_exponent(q)[..., None])
+        unit: Float64 = scaled / norm(scaled)[..., None]
+        return unit
 
 
 def checked_unit(name: str, value: npt.ArrayLike) -> Float64:
@@ -96,13 +110,18 @@ def from_axis_angle(axis: npt.ArrayLike, angle_rad: npt.ArrayLike) -> Float64:
     Raises:
         ValueError: on an axis of length 0, of another width than 3, or on NaN.
     """
-    direction, angle = numbers("axis", axis), numbers("angle_rad", angle_rad)
-    if direction.ndim == 0 or direction.shape[-1] != 3:
-        raise ValueError(f"axis must end in an axis of 3, got shape {direction.shape}")
-    length = norm(direction)
-    if (length == 0.0).any():
-        raise ValueError("axis must not be the zero vector: it has no direction")
-    return from_rotation_vector(direction * (angle / length)[..., None])
+    about, angle = numbers("axis", axis), numbers("angle_rad", angle_rad)
+    if about.ndim == 0 or about.shape[-1] != 3:
+        raise ValueError(f"axis must end in an axis of 3, got shape {about.shape}")
+    try:
+        shape = np.broadcast_shapes(about.shape[:-1], angle.shape)
+    except ValueError as error:
+        raise ValueError(f"axis {about.shape} and angle_rad {angle.shape}: {error}") from error
+    half = np.broadcast_to(0.5 * angle, shape)
+    q = np.empty((*shape, 4))
+    q[..., 0] = np.cos(half)
+    q[..., 1:] = np.sin(half)[..., None] * direction("axis", about)
+    return q
 
 
 def from_rotation_vector(vector: Float64) -> Float64:

@@ -25,8 +25,22 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.rigid_body import quaternion
-from roller_env.rigid_body.arrays import Float64, dot, numbers, positive, read_only, rows, scalars
+from roller_env.rigid_body import kernels, quaternion
+from roller_env.rigid_body.arrays import (
+    Float64,
+    chosen,
+    dot,
+    floats,
+    numbers,
+    positive,
+    read_only,
+    rows,
+    scalars,
+    whole,
+)
+
+_LEAST, _MOST = 1e-300, 1e300
+"""Masses, kg, and moments, kg m^2, within which they, their sums and inverses are exact floats."""
 
 _TRIANGLE_SLACK = 1e-9
 """Relative rounding allowed before three moments of inertia are called impossible."""
@@ -73,7 +87,8 @@ class Body:
         number = _count(count, edge.shape, np.shape(mass))
         edges = scalars("size", edge, number)
         masses = scalars("mass", positive("mass", mass), number)
-        moment = edges**2 * masses / 6.0
+        with np.errstate(over="ignore", under="ignore"):
+            moment = edges**2 * masses / 6.0
         return cls._made(np.stack([edges] * 3, axis=-1), masses, np.stack([moment] * 3, axis=-1))
 
     @classmethod
@@ -94,10 +109,10 @@ class Body:
         number = _count(count, edges.shape[:-1], np.shape(mass))
         edges = rows("size", edges, number, 3)
         masses = scalars("mass", positive("mass", mass), number)
-        squares = edges**2
-        moments = (
-            masses[:, None] / 12.0 * (np.roll(squares, -1, axis=1) + np.roll(squares, 1, axis=1))
-        )
+        with np.errstate(over="ignore", under="ignore"):
+            squares = edges**2
+            of_both = np.roll(squares, -1, axis=1) + np.roll(squares, 1, axis=1)
+            moments = masses[:, None] / 12.0 * of_both
         return cls._made(edges, masses, moments)
 
     @classmethod
@@ -119,6 +134,7 @@ class Body:
         number = _count(count, moments.shape[:-1], np.shape(mass))
         moments = rows("inertia", moments, number, 3)
         masses = scalars("mass", positive("mass", mass), number)
+        _check_range("inertia", moments)
         total = moments.sum(axis=1, keepdims=True)
         excess = total - 2.0 * moments
         if (excess < -_TRIANGLE_SLACK * total).any():
@@ -127,11 +143,14 @@ class Body:
                 f"inertia {wrong.tolist()} belongs to no body: "
                 "no moment may exceed the sum of the other two"
             )
-        edges = np.sqrt(6.0 * np.maximum(excess, 0.0) / masses[:, None])
+        # Two roots, since the quotient of what they are of may be out of range.
+        edges = np.sqrt(6.0 * np.maximum(excess, 0.0)) / np.sqrt(masses)[:, None]
         return cls._made(edges, masses, moments)
 
     @classmethod
     def _made(cls, size: Float64, mass: Float64, inertia: Float64) -> Body:
+        _check_range("mass", mass)
+        _check_range("inertia (it follows from size and mass)", inertia)
         values = (size, mass, 1.0 / mass, inertia, 1.0 / inertia)
         return cls(*(read_only(value) for value in values))
 
@@ -150,15 +169,47 @@ class Body:
         """The body axes in order of rising moment of inertia, (N, 3)."""
         return np.argsort(self.inertia, axis=1, kind="stable")
 
+    @cached_property
+    def constants(self) -> kernels.Bodies:
+        """The same values as compiled loops take them."""
+        return kernels.Bodies(
+            self.mass,
+            self.inverse_mass,
+            self.inertia,
+            self.inverse_inertia,
+            self.axes_by_inertia.astype(np.int64),
+            (self.inertia == self.inertia[:, :1]).all(axis=1),
+        )
+
     def take(self, indices: npt.ArrayLike) -> Body:
-        """Return the bodies at ``indices`` (K,), which may repeat one."""
-        index = np.asarray(indices, dtype=np.intp)
+        """Return the bodies at ``indices`` (K,), which may repeat one, or under a mask (N,).
+
+        Raises:
+            ValueError: on rows that are not there, fractions, a mask of another length, or none.
+        """
+        index = chosen("indices", indices, self.count)
         return Body._made(self.size[index], self.mass[index], self.inertia[index])
+
+
+def _check_range(name: str, value: Float64) -> None:
+    """Refuse what has no inverse, or is none: beyond them energies are 0, infinite or NaN.
+
+    Raises:
+        ValueError: naming the first value that is outside `_LEAST` to `_MOST`.
+    """
+    outside = ~((value >= _LEAST) & (value <= _MOST))
+    if outside.any():
+        raise ValueError(
+            f"{name} must be from {_LEAST:g} to {_MOST:g}, to have an inverse, "
+            f"got {value[outside][0]:g}"
+        )
 
 
 def _count(count: int | None, *shapes: tuple[int, ...]) -> int:
     """Return the number of bodies that the arguments' leading axes ask for."""
-    lengths = {shape[0] for shape in shapes if shape} | ({count} if count is not None else set())
+    lengths = {shape[0] for shape in shapes if shape}
+    if count is not None:
+        lengths.add(whole("count", count, 1))
     wanted = lengths - {1} or {1}
     if len(wanted) > 1:
         raise ValueError(
@@ -207,6 +258,8 @@ class State:
             recalculated with ``renormalise=False``; the rotation is then that of its direction.
         angular_momentum: (N, 3) about the centre of mass, world frame, kg m^2/s.
         normalised: whether the orientation has been scaled to norm 1.
+        own_momentum: ``body_angular_momentum`` to the last bit, (N, 3), in a state of a method that
+            keeps that instead; None: it follows.
     """
 
     body: Body
@@ -215,6 +268,7 @@ class State:
     orientation: Float64
     angular_momentum: Float64
     normalised: bool = field(default=True, kw_only=True)
+    own_momentum: Float64 | None = field(default=None, kw_only=True, repr=False)
 
     @classmethod
     def create(
@@ -241,18 +295,20 @@ class State:
 
         Raises:
             ValueError: a wrong shape, NaN, a quaternion far from unit, or a velocity and its
-                momentum both given.
+                momentum both given; or a momentum that is too large to be a number.
         """
         count = body.count
         q = rows("orientation", quaternion.checked_unit("orientation", orientation), count, 4)
         given = _one_of("velocity", velocity, "momentum", momentum)
         linear = rows(*given, count, 3)
-        if velocity is not None:
-            linear *= body.mass[:, None]
+        with np.errstate(over="ignore", invalid="ignore"):
+            linear = linear if velocity is None else linear * body.mass[:, None]
         given = _one_of("angular_velocity", angular_velocity, "angular_momentum", angular_momentum)
         angular = rows(*given, count, 3)
-        if angular_velocity is not None:
-            angular = _tensor_product(body, body.inertia, q, angular)
+        with np.errstate(over="ignore", invalid="ignore"):
+            if angular_velocity is not None:
+                angular = _tensor_product(body, body.inertia, q, angular)
+        linear, angular = numbers("momentum", linear), numbers("angular_momentum", angular)
         where = rows("position", position, count, 3)
         return cls(body, *(read_only(value) for value in (where, linear, q, angular)))
 
@@ -290,7 +346,8 @@ class State:
             _replaced("angular_momentum", angular_momentum, self.angular_momentum),
         ]
         if orientation is None:
-            return State(self.body, *values, normalised=self.normalised)
+            own = self.own_momentum if angular_momentum is None else None
+            return State(self.body, *values, normalised=self.normalised, own_momentum=own)
         if renormalise:
             values[2] = read_only(quaternion.normalise(values[2]))
         return State(self.body, *values, normalised=renormalise)
@@ -309,6 +366,13 @@ class State:
     def angular_velocity(self) -> Float64:
         """Angular velocity, (N, 3) rad/s, world frame: R I^-1 R^T L; on cubes simply L / I."""
         return read_only(self.over_inertia(self.angular_momentum))
+
+    @cached_property
+    def body_angular_momentum(self) -> Float64:
+        """Angular momentum in **body** axes, (N, 3) kg m^2/s: what Euler's equations move."""
+        if self.own_momentum is not None:
+            return self.own_momentum
+        return read_only(quaternion.rotate_inverse(self.rotation, self.angular_momentum))
 
     @cached_property
     def spin(self) -> Float64:
@@ -342,12 +406,53 @@ class State:
         matrix[:, 3, 3] = 1.0
         return read_only(matrix)
 
+    def rows(self, *, body_axes: bool = False) -> Float64:
+        """Return the primary values as compiled loops take them, (N, `kernels.POINT`).
+
+        Args:
+            body_axes: the last three numbers of a row are the angular momentum in body axes.
+        """
+        rows = np.zeros((self.count, kernels.POINT))
+        rows[:, 0:3] = self.position
+        rows[:, 3:6] = self.momentum
+        rows[:, 6:10] = self.orientation
+        rows[:, 10:13] = self.angular_momentum
+        if body_axes:
+            rows[:, 13:16] = self.body_angular_momentum
+        return rows
+
+    def from_rows(self, rows: Float64, *, normalised: bool, body_axes: bool) -> State:
+        """Return these bodies in the state of ``rows``; the inverse of `rows`."""
+        x, p, q, momentum, own = (
+            read_only(np.ascontiguousarray(rows[:, first:end]))
+            for first, end in ((0, 3), (3, 6), (6, 10), (10, 13), (13, 16))
+        )
+        return State(
+            self.body,
+            x,
+            p,
+            q,
+            momentum,
+            normalised=normalised,
+            own_momentum=own if body_axes else None,
+        )
+
     def over_inertia(self, vector: Float64) -> Float64:
-        """Return I^-1 ``vector``, both (N, 3) world frame: torque to angular acceleration."""
+        """Return I^-1 ``vector``, both (N, 3) world frame: torque to angular acceleration.
+
+        Raises:
+            ValueError: on another shape.
+        """
+        _same_shape("vector", vector, self.momentum)
         return _tensor_product(self.body, self.body.inverse_inertia, self.rotation, vector)
 
     def times_inertia(self, vector: Float64) -> Float64:
-        """Return I ``vector``, both (N, 3) in the world frame: angular velocity to momentum."""
+        """Return I ``vector``, both (N, 3) in the world frame: angular velocity to momentum.
+
+        Raises:
+            ValueError: on another shape.
+        """
+        _same_shape("vector", vector, self.momentum)
         return _tensor_product(self.body, self.body.inertia, self.rotation, vector)
 
     def points_to_world(self, points: npt.ArrayLike) -> Float64:
@@ -401,11 +506,12 @@ class State:
         return finite
 
     def take(self, indices: npt.ArrayLike) -> State:
-        """Return the bodies at ``indices`` (K,), which may repeat one, as a state of their own."""
-        index = np.asarray(indices, dtype=np.intp)
+        """Return some bodies as a state of their own; argument and errors as `Body.take`."""
+        index = chosen("indices", indices, self.count)
         primary = (self.position, self.momentum, self.orientation, self.angular_momentum)
         taken = (read_only(value[index]) for value in primary)
-        return State(self.body.take(index), *taken, normalised=self.normalised)
+        own = None if self.own_momentum is None else read_only(self.own_momentum[index])
+        return State(self.body.take(index), *taken, normalised=self.normalised, own_momentum=own)
 
 
 def _one_of(
@@ -428,6 +534,11 @@ def _tensor_product(body: Body, diagonal: Float64, q: Float64, vector: Float64) 
 def _replaced(name: str, new: Float64 | None, old: Float64) -> Float64:
     if new is None:
         return old
-    if new.shape != old.shape:
-        raise ValueError(f"{name} must have shape {old.shape}, got {new.shape}")
-    return read_only(np.array(new, dtype=np.float64))
+    array = floats(name, new)
+    _same_shape(name, array, old)
+    return read_only(array)
+
+
+def _same_shape(name: str, new: Float64, old: Float64) -> None:
+    if np.shape(new) != old.shape:
+        raise ValueError(f"{name} must have shape {old.shape}, got {np.shape(new)}")

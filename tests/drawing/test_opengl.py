@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.patience import STALLED_S
+
 LIBRARIES = ("libEGL.so", "libEGL.so.1", "libOpenGL.so", "libOpenGL.so.0")
 
 PLAY_AND_DRAW = """
@@ -42,7 +44,7 @@ def play_and_draw(code: str = PLAY_AND_DRAW, **environment: str) -> list[str]:
         cwd=Path(__file__).parents[2],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=STALLED_S,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -19,30 +19,29 @@ import pytest
 from roller_env.envs.vector import RollerVectorEnv
 from roller_env.lab.benchmark import scale
 from roller_env.lab.benchmark.breakdown import where_the_time_goes
-from roller_env.lab.benchmark.contestants import (
+from roller_env.lab.benchmark.cases import (
     BareLoop,
     BatchAlone,
     ReplayError,
     SingleStep,
     VectorStep,
 )
-from roller_env.lab.benchmark.footprint import Stay, resident_bytes, watch
-from roller_env.lab.benchmark.goals import NOT_MEASURED, judge
-from roller_env.lab.benchmark.levels import YARD_BOXES, level_of_boxes, level_of_coins
 from roller_env.lab.benchmark.peer_worker import serve
 from roller_env.lab.benchmark.peers import Peer, PeerError
-from roller_env.lab.benchmark.race import (
-    Contestant,
-    Median,
-    Pace,
-    race,
-    simulated_ratio,
-    speed_ratio,
+from roller_env.lab.benchmark.ratios import GOALS, NOT_MEASURED, judge
+from roller_env.lab.benchmark.scale import (
+    YARD_BOXES,
+    Probe,
+    level_of_boxes,
+    level_of_coins,
+    resident_gb,
+    watch,
 )
-from roller_env.lab.benchmark.ratios import GOALS
+from roller_env.lab.runner import Case, Config, Median, compare, simulated_ratio, speed_ratio
+from roller_env.lab.table import frame
 
 SCRIPTS = Path(__file__).parents[2] / "scripts"
-BRIEF = Pace(rounds=2, round_s=0.01, warm_up_s=0.5)
+BRIEF = Config(rounds=2, round_s=0.01, warm_up_s=0.5)
 SHORT_EPISODE = 7
 ENDS: dict[str, Any] = {
     "level": "bridge",
@@ -53,14 +52,14 @@ ENDS: dict[str, Any] = {
 """Options with which episodes end all the time."""
 
 
-class Clockwork(Contestant):
+class Clockwork(Case):
     """Takes the time it is told, a step, and writes down whose turn it was."""
 
     def __init__(self, name: str, step_s: float, turns: list[str], env_steps: int = 1) -> None:
         self._step_s, self._turns = step_s, turns
         super().__init__(name, env_steps, simulated_s=0.05)
 
-    def prepare(self, pace: Pace) -> int:
+    def prepare(self, config: Config) -> int:
         return 10
 
     def _run(self, steps: int) -> float:
@@ -68,29 +67,29 @@ class Clockwork(Contestant):
         return steps * self._step_s
 
 
-def test_contestants_take_turns_round_by_round() -> None:
+def test_cases_take_turns_round_by_round() -> None:
     turns: list[str] = []
-    contestants = [Clockwork(name, 1.0, turns) for name in "AB"]
-    race(contestants, Pace(rounds=3, round_s=1.0, warm_up_s=1.0))
+    cases = [Clockwork(name, 1.0, turns) for name in "AB"]
+    compare(cases, Config(rounds=3, round_s=1.0, warm_up_s=1.0))
     assert turns == ["A", "B"] * 3
 
 
 def test_twice_the_environments_in_half_the_time_are_four_times_the_speed() -> None:
     fast, slow = Clockwork("fast", 0.5, [], env_steps=2), Clockwork("slow", 1.0, [], env_steps=1)
-    results = race([fast, slow], BRIEF)
+    results = compare([fast, slow], BRIEF)
     assert speed_ratio(results["fast"], results["slow"]) == Median(4.0, 4.0, 4.0)
     fast.simulated_s *= 3.0
     assert simulated_ratio(results["fast"], results["slow"]).value == pytest.approx(12.0)
     assert results["fast"].env_steps_per_s.value == 4.0
 
 
-def test_a_round_is_as_long_as_the_pace_says() -> None:
-    class Sleeper(Contestant):
+def test_a_round_is_as_long_as_the_config_says() -> None:
+    class Sleeper(Case):
         def _run(self, steps: int) -> float:
             return steps * 1e-3
 
     sleeper = Sleeper("sleeper", 1, simulated_s=0.05)
-    assert sleeper.prepare(Pace(rounds=1, round_s=0.25, warm_up_s=1.0)) == 250
+    assert sleeper.prepare(Config(rounds=1, round_s=0.25, warm_up_s=1.0)) == 250
     # A second of the game is twenty of its steps, and the length of a round had to be found.
     assert sleeper.steps_done == 20 + (2**7 - 1)
 
@@ -107,14 +106,14 @@ def test_a_round_is_as_long_as_the_pace_says() -> None:
 )
 def test_a_goal_is_met_missed_or_not_measured(sense: str, value: float, verdict: str) -> None:
     row = judge("", sense, 2.0, Median(value, value, value), rounds=3)  # type: ignore[arg-type]
-    assert row.verdict == verdict
-    assert row.rounds == (0 if verdict == "not measured" else 3)
+    assert row["verdict"] == verdict
+    assert row["rounds"] == (0 if verdict == "not measured" else 3)
 
 
-@pytest.mark.parametrize("pace", [(0, 1.0, 1.0), (1, 0.0, 1.0), (1, 1.0, math.nan)])
-def test_a_pace_that_measures_nothing_is_refused(pace: tuple[int, float, float]) -> None:
+@pytest.mark.parametrize("config", [(0, 1.0, 1.0), (1, 0.0, 1.0), (1, 1.0, math.nan)])
+def test_a_config_that_measures_nothing_is_refused(config: tuple[int, float, float]) -> None:
     with pytest.raises(ValueError, match="found"):
-        Pace(*pace)
+        Config(*config)
 
 
 # --- physics alone does the same work --------------------------------------------------------
@@ -124,7 +123,7 @@ def test_batch_alone_takes_every_ball_where_the_game_takes_it_resets_included() 
     vector = VectorStep("vector", 5, 1, **ENDS)
     alone = BatchAlone("alone", vector)
     before = vector.simulation.snapshot().physics
-    race([vector, alone], BRIEF)
+    compare([vector, alone], BRIEF)
     assert alone.steps_done == vector.steps_done > SHORT_EPISODE
     assert (vector.simulation.snapshot().physics != before).any(axis=1).all()
     alone.verify()
@@ -133,7 +132,7 @@ def test_batch_alone_takes_every_ball_where_the_game_takes_it_resets_included() 
 def test_the_bare_loop_takes_the_ball_where_the_game_takes_it_resets_included() -> None:
     single = SingleStep("single", **ENDS)
     alone = BareLoop("alone", single)
-    race([single, alone], BRIEF)
+    compare([single, alone], BRIEF)
     assert alone.steps_done == single.steps_done > SHORT_EPISODE
     alone.verify()
 
@@ -155,9 +154,9 @@ def test_the_parts_are_the_whole() -> None:
     start = time.perf_counter()
     rows = where_the_time_goes("step", lambda: vector.run(60), 60 * 64)
     elapsed_us = 1e6 * (time.perf_counter() - start)
-    assert sum(row.share for row in rows) == pytest.approx(1.0)
-    assert sum(row.us_per_env_step for row in rows) == pytest.approx(elapsed_us / 3840, rel=0.05)
-    assert rows == sorted(rows, key=lambda row: -row.share)
+    assert rows.share.sum() == pytest.approx(1.0)
+    assert rows.us_per_env_step.sum() == pytest.approx(elapsed_us / 3840, rel=0.1)
+    assert rows.share.is_monotonic_decreasing
 
 
 def test_physics_that_is_made_finer_takes_a_greater_share() -> None:
@@ -166,7 +165,7 @@ def test_physics_that_is_made_finer_takes_a_greater_share() -> None:
         vector = VectorStep("vector", 4, 1, level="flat", control_dt_s=control_dt_s)
         vector.run(10)
         rows = where_the_time_goes("step", lambda: vector.run(round(20 / control_dt_s)), 1)
-        return sum(row.share for row in rows if row.part == "physics: MuJoCo")
+        return float(rows[rows.part == "physics: MuJoCo"].share.sum())
 
     assert share(1 / 240) < 0.6 < share(0.2)
 
@@ -177,9 +176,9 @@ def test_time_outside_the_house_is_all_else() -> None:
         while time.perf_counter() < end:
             pass
 
-    (row,) = where_the_time_goes("waiting", work, 1)
-    assert (row.part, row.share) == ("all else", 1.0)
-    assert row.us_per_env_step == pytest.approx(50_000, rel=0.5)
+    rows = where_the_time_goes("waiting", work, 1)
+    assert (rows.part.tolist(), rows.share.tolist()) == (["all else"], [1.0])
+    assert rows.us_per_env_step[0] == pytest.approx(50_000, rel=0.5)
 
 
 # --- scale -----------------------------------------------------------------------------------
@@ -218,35 +217,33 @@ def test_impossible_sizes_are_refused() -> None:
 
 
 def test_memory_is_seen_to_grow() -> None:
-    before = resident_bytes()
+    before = resident_gb()
     ballast = np.ones(10**7)
-    assert resident_bytes() - before > 0.9 * ballast.nbytes
+    assert resident_gb() - before > 0.9e-9 * ballast.nbytes
 
 
 def test_a_fresh_process_tells_its_memory_as_it_goes() -> None:
-    stay = Stay(8, 64, 4, {"level": "flat", "num_threads": 1})
-    footprints = list(watch(stay))
-    assert [footprint.env_steps for footprint in footprints] == [16, 32, 48, 64]
-    assert all(footprint.resident_bytes > 10**7 for footprint in footprints)
+    rows = list(watch(Probe(8, 64, 4, {"level": "flat", "num_threads": 1})))
+    assert [row["env_steps"] for row in rows] == [16, 32, 48, 64]
+    assert all(row["resident_gb"] > 0.01 for row in rows)
 
 
-def test_a_process_that_fails_is_not_a_footprint() -> None:
+def test_a_process_that_fails_is_no_sample() -> None:
     with pytest.raises(RuntimeError, match="code 1"):
-        list(watch(Stay(1, 1, 1, {"level": "nowhere"})))
+        list(watch(Probe(1, 1, 1, {"level": "nowhere"})))
 
 
 @pytest.mark.parametrize(("end_gb", "verdict"), [(0.101, "met"), (0.11, "missed")])
 def test_a_leak_is_judged_by_the_end_against_the_first_tenth(end_gb: float, verdict: str) -> None:
     resident = [0.05, 0.1, *[0.1] * 17, end_gb]
-    rows = [scale.MemoryRow(1, step, gb) for step, gb in enumerate(resident)]
-    row = scale.judge_leak(rows)
-    assert row.measured == pytest.approx(end_gb / 0.1)
-    assert row.verdict == verdict
+    row = scale.judge_leak(frame([{"resident_gb": gb} for gb in resident]))
+    assert row["measured"] == pytest.approx(end_gb / 0.1)
+    assert row["verdict"] == verdict
 
 
 def test_what_was_not_tried_is_not_measured() -> None:
     row = judge(*scale.BOXES_GOAL, NOT_MEASURED)
-    assert row.verdict == "not measured"
+    assert row["verdict"] == "not measured"
 
 
 # --- peers -----------------------------------------------------------------------------------

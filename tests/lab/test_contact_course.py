@@ -19,8 +19,8 @@ from roller_env.lab.contact.course import (
     played_controls,
 )
 from roller_env.lab.contact.scene import ContactScene
-from roller_env.lab.experiment import Measure
 from roller_env.lab.methods import MUJOCO, MujocoMethod, without_warnings
+from roller_env.lab.scene import Measure
 
 GameSceneType = TypeVar("GameSceneType", bound=GameScene)
 

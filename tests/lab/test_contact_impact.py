@@ -18,9 +18,10 @@ from roller_env.lab.contact.impact import (
     rigid_bounce,
     soft_bounce,
 )
-from roller_env.lab.contact.scene import GRAVITY_M_S2, contact_of, new_spec
-from roller_env.lab.contact.trial import Path
+from roller_env.lab.contact.scene import contact_of, new_spec
+from roller_env.lab.game import GRAVITY_M_S2
 from roller_env.lab.methods import MUJOCO, MujocoMethod
+from roller_env.lab.simulate import Path
 from roller_env.physics.materials import IMPEDANCE, damping_ratio
 
 

@@ -17,16 +17,10 @@ from roller_env.lab.contact.rolling import (
     roll_time,
     slip_speed,
 )
-from roller_env.lab.contact.scene import (
-    BALL_RADIUS_M,
-    FRICTION,
-    GRAVITY_M_S2,
-    SOFT_TIME_CONSTANT_S,
-    resting_depth,
-    soft_contact,
-)
-from roller_env.lab.contact.trial import Path
+from roller_env.lab.contact.scene import SOFT_TIME_CONSTANT_S, resting_depth, soft_contact
+from roller_env.lab.game import FRICTION, GRAVITY_M_S2, RADIUS_M
 from roller_env.lab.methods import MUJOCO, PYRAMIDAL, MujocoMethod
+from roller_env.lab.simulate import Path
 
 RK4 = MujocoMethod("RK4")
 EULER_FAMILY = tuple(method for method in MUJOCO if method != RK4)
@@ -67,8 +61,8 @@ def test_what_rk4_keeps_is_the_shorter_lever_of_a_ball_that_sinks_in(scene: Stea
     """
     pull = GRAVITY_M_S2 * math.cos(math.radians(scene.slope_deg))
     depth = resting_depth(soft_contact()["solref"], pull)
-    lever = BALL_RADIUS_M - depth / 2.0
-    slower = 1.0 - 1.4 / (1.0 + 0.4 * (BALL_RADIUS_M / lever) ** 2)
+    lever = RADIUS_M - depth / 2.0
+    slower = 1.0 - 1.4 / (1.0 + 0.4 * (RADIUS_M / lever) ** 2)
     assert scene.trial(RK4, 0.01).errors()["acceleration"] == pytest.approx(slower, rel=0.03)
 
 
@@ -90,8 +84,8 @@ def test_the_soft_contact_throws_the_ball_up_beyond_the_predicted_step() -> None
 
 def shorter_lever(path: Path) -> float:
     """Return what friction loses of the spin it gives: MuJoCo puts the contact half way in."""
-    depth = BALL_RADIUS_M - path.qpos[:, 2].min()
-    return float(5.0 / 7.0 * depth / (2.0 * BALL_RADIUS_M))
+    depth = RADIUS_M - path.qpos[:, 2].min()
+    return float(5.0 / 7.0 * depth / (2.0 * RADIUS_M))
 
 
 def hop_at_the_end(path: Path) -> float:

@@ -11,8 +11,8 @@ from roller_env.lab.contact import CONTACT_SCENES
 from roller_env.lab.contact.rolling import Skid
 from roller_env.lab.contact.scene import ContactScene
 from roller_env.lab.contact.trial import steps_of
-from roller_env.lab.experiment import SteadyTrial, measure
 from roller_env.lab.methods import RIGID_BODY, MujocoMethod, without_warnings
+from roller_env.lab.scene import SteadyTrial, measure
 
 SCENES = {scene.name: scene for scene in CONTACT_SCENES}
 scenes = pytest.mark.parametrize("scene", CONTACT_SCENES, ids=SCENES)
@@ -78,8 +78,8 @@ def test_a_method_that_errs_too_much_is_reported_as_failed() -> None:
     assert isinstance(skid, Skid)
     coarse = measure(skid, MujocoMethod("Euler"), 0.01, repeats=1)
     fine = measure(skid, MujocoMethod("Euler"), 0.005, repeats=1)
-    assert all(point.failed for point in coarse)
-    assert not any(point.failed for point in fine)
+    assert all(point["failed"] for point in coarse)
+    assert not any(point["failed"] for point in fine)
 
 
 def test_a_simulation_that_diverges_is_reported_as_failed_with_no_number() -> None:
@@ -99,8 +99,8 @@ def test_an_error_beyond_the_scenes_limit_is_a_failure() -> None:
             measure(SCENES["bounce"], MujocoMethod("Euler"), dt_s, repeats=1)[0]
             for dt_s in (0.02, 0.001)
         )
-    assert far.failed
-    assert not near.failed
+    assert far["failed"]
+    assert not near["failed"]
 
 
 def test_the_rigid_body_is_refused_by_name() -> None:

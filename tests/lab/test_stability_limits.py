@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from roller_env.lab.stability.bisection import bisect, first_failure, locate
 from roller_env.lab.stability.cases import EXACT, FULL, QUICK, Case, Effort, Finding, judged
 from roller_env.lab.stability.impact import worst_return
-from roller_env.lab.stability.limits import CASES, GROUPS
+from roller_env.lab.stability.run import CASES, GROUPS
 from roller_env.lab.stability.scenes import TAU_S
 from roller_env.lab.stability.smooth import drag_limit, rk4_servo_limit, stability_polynomial
 from roller_env.physics.materials import restitution
@@ -28,7 +28,7 @@ QUICK_CASES = [name for name, case in CASES.items() if case.quick]
 def test_a_limit_is_where_its_formula_puts_it(name: str) -> None:
     row = judged(CASES[name], QUICK)
     expected = "differs" if name in DIFFER else "holds"
-    assert row.verdict == expected, f"{row.measured:g} measured, {row.predicted:g} predicted"
+    assert row["verdict"] == expected, (row["measured"], row["predicted"])
 
 
 def test_a_band_wider_than_one_per_cent_says_why() -> None:
@@ -130,12 +130,12 @@ def test_values_that_do_not_rise_are_refused(values: tuple[float, ...]) -> None:
 def test_a_wrong_prediction_is_found_to_be_wrong() -> None:
     """The harness itself can say no: the measured value a tenth off, and a limit where none is."""
     off = _case(predicted=1.0, measured=1.1)
-    assert judged(off, QUICK).verdict == "differs"
-    assert judged(off, QUICK).ratio == pytest.approx(1.1)
-    assert judged(_case(predicted=math.inf, measured=7.0), QUICK).verdict == "differs"
-    assert judged(_case(predicted=7.0, measured=math.inf), QUICK).verdict == "differs"
-    assert judged(_case(predicted=7.0, measured=math.nan), QUICK).verdict == "differs"
-    assert judged(_case(predicted=math.inf, measured=math.inf), QUICK).verdict == "holds"
+    assert judged(off, QUICK)["verdict"] == "differs"
+    assert judged(off, QUICK)["ratio"] == pytest.approx(1.1)
+    assert judged(_case(predicted=math.inf, measured=7.0), QUICK)["verdict"] == "differs"
+    assert judged(_case(predicted=7.0, measured=math.inf), QUICK)["verdict"] == "differs"
+    assert judged(_case(predicted=7.0, measured=math.nan), QUICK)["verdict"] == "differs"
+    assert judged(_case(predicted=math.inf, measured=math.inf), QUICK)["verdict"] == "holds"
 
 
 def _case(predicted: float, measured: float) -> Case:

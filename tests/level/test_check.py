@@ -216,9 +216,9 @@ def test_coins_are_counted_over_the_whole_level_without_making_them() -> None:
     grid = {"grid": {"centre": (0, 0, 5), "spacing": (1, 1), "count": (100, 100)}}
     assert faults(coins=[grid]) == []
     assert faults(coins=[grid, {"at": (0, 0, 9)}]) == [("coins",)]
-    began = time.perf_counter()
+    began = time.process_time()
     assert faults(coins=[grid] * 5_000) == [("coins",)]
-    assert time.perf_counter() - began < 5.0
+    assert time.process_time() - began < 5.0
 
 
 def test_pieces_are_counted_over_the_whole_level() -> None:

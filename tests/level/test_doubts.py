@@ -144,9 +144,9 @@ def test_ten_thousand_coins_and_a_thousand_turned_boxes_take_about_a_second() ->
     grid = {"centre": (0, 0, 300.0), "spacing": (1, 1), "count": (99, 99)}
     level = small_level(boxes=[*_floor(), *boxes], coins=[*coins, {"grid": grid}])
     assert 9_000 < 99 * 99 + len(coins) <= MAX_COINS
-    began = time.perf_counter()
+    began = time.process_time()
     found = [problem.path for problem in level_warnings(level)]
-    assert time.perf_counter() - began < 5.0
+    assert time.process_time() - began < 5.0
     assert found == [("coins", index) for index in range(10)]
 
 

@@ -1,4 +1,4 @@
-"""The game or a replay on a page, served by a process of its own, and a person's eyes and hands.
+"""The game or a replay on a page, served by a process of its own.
 
 A process of its own, because Studio (MuJoCo 4.0.0) can have one page in the life of a process: the
 second one's viewer never ends.
@@ -6,20 +6,18 @@ second one's viewer never ends.
 
 from __future__ import annotations
 
-import io
+import json
 import multiprocessing
-import os
 import socket
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.connection import Connection
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple
+from urllib.request import ProxyHandler, build_opener
 
 import numpy as np
-import numpy.typing as npt
-import pytest
-from PIL import Image
 
 from roller_env.play.app import Choices, GamePlugin, ScreenPlugin
 from roller_env.play.panels import Choice
@@ -29,29 +27,8 @@ from roller_env.play.server import LOOPBACK, Plugins, open_page, run
 from roller_env.play.session import GameFrame, Phase
 from roller_env.play.sound import CoinSound
 from roller_env.replay import load_replay, shipped_replays
-from tests.play.lane import Witness, game
-
-Picture = npt.NDArray[np.int64]
-
-PATIENCE_S: Final = 60.0
-"""How long a test waits for what must come: a machine that draws in software and has other things
-to do takes its time."""
-
-SIZE: Final = {"width": 420, "height": 320}
-STATUS_ROWS: Final = 34
-"""At the bottom, of Studio's own status bar."""
-SCENE: Final = (slice(0, -STATUS_ROWS), slice(None))
-"""Rows and columns of the picture."""
-POINTS: Final = (slice(10, 95), slice(10, 125))
-"""Of the points panel."""
-PANEL: Final = (slice(120, 180), slice(25, 42))
-"""Of the left margin of the start, pause and end panels, where nothing is written."""
-WATCHED_BALL: Final = (slice(120, 165), slice(190, 230))
-"""Of the ball at the start, as a second browser sees it."""
-MIDDLE: Final = (slice(110, 260), slice(60, 360))
-"""Of the ball, and of the floor round it."""
-TIME_LINE: Final = (slice(230, 266), slice(110, 385))
-"""Of a replay's time line."""
+from tests.patience import STALLED_S
+from tests.play.lane import Witness, game, lane
 
 
 class Status(NamedTuple):
@@ -61,7 +38,7 @@ class Status(NamedTuple):
         phase: what the game is doing.
         episode: number of the episode.
         ball_x: how far forward the ball is, metres.
-        pushed: whether any key pushed it in the last step.
+        pushed: whether any key pushes it.
         coins: collected.
         success: at the finish.
         camera: the mode of the player's.
@@ -93,15 +70,12 @@ class ReplayStatus(NamedTuple):
     duration_s: float
 
 
-def wait_for(what: str, holds: Callable[[], bool], pause: Callable[[], Any] | None = None) -> None:
-    """Wait until something holds."""
-    end = time.monotonic() + PATIENCE_S
-    while not holds():
-        assert time.monotonic() < end, f"waited {PATIENCE_S} s in vain until {what}"
-        if pause is None:
-            time.sleep(0.02)
-        else:
-            pause()
+def wait_until_served(is_served: Callable[[], bool]) -> None:
+    """Wait for a page that comes up; whoever says whether it is there also says if it is dead."""
+    end = time.monotonic() + STALLED_S
+    while not is_served():
+        assert time.monotonic() < end, f"the page was not served in {STALLED_S} s"
+        time.sleep(0.02)
 
 
 def free_port() -> int:
@@ -111,16 +85,23 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def is_served(host: str, port: int) -> bool:
-    """Say whether somebody listens there."""
-    with socket.socket() as probe:
-        return probe.connect_ex((host, port)) == 0
+EMPTY_SCENE_BYTES: Final = 100_000
+"""More than Studio's empty scene, and less than any level with its textures."""
+
+WITHOUT_PROXY: Final = build_opener(ProxyHandler({}))
 
 
-class HasUrl(Protocol):
-    """Something with a page."""
+def is_served(url: str) -> bool:
+    """Say whether a level is served there.
 
-    url: str
+    Studio serves an empty scene first. A page that is opened before the level takes its place may
+    say "Parsing model..." for ever, and show the panels over nothing (seen with MuJoCo 4.0.0).
+    """
+    try:
+        with WITHOUT_PROXY.open(f"{url}model?total_bytes", timeout=STALLED_S) as reply:
+            return int(json.load(reply)["total_bytes"]) > EMPTY_SCENE_BYTES
+    except OSError:
+        return False
 
 
 class Served:
@@ -134,12 +115,12 @@ class Served:
         self._line, theirs = spawn.Pipe()
         self._process = spawn.Process(target=_serve, args=(make, host, self.port, theirs))
         self._process.start()
-        wait_for("the page is served", self._is_served)
+        wait_until_served(self._is_served)
 
     def close(self) -> int | None:
         """Stop serving, and return the process's exit code."""
         self._line.send("end")
-        self._process.join(PATIENCE_S)
+        self._process.join(STALLED_S)
         return self._process.exitcode
 
     def _ask(self) -> Any:
@@ -148,7 +129,7 @@ class Served:
 
     def _is_served(self) -> bool:
         assert self._process.is_alive(), f"it ended with {self._process.exitcode}"
-        return is_served(self.host, self.port)
+        return is_served(self.url)
 
 
 class Stand(Served):
@@ -185,17 +166,26 @@ Make = Callable[[], tuple[Plugins, Asked]]
 
 
 def _serve(make: Make, host: str, port: int, line: Connection[Any, Any]) -> None:
-    """Serve what is made, in the other process, until ``line`` says "end"."""
+    """Serve what is made, in the other process, until ``line`` says "end" or is cut."""
     plugins, asked = make()
     ended = threading.Event()
 
     def answer() -> None:
-        while line.recv() == "status":
-            line.send(asked())
+        # A test run that is killed says nothing more, and leaves nobody behind.
+        with suppress(EOFError):
+            while line.recv() == "status":
+                line.send(asked())
         ended.set()
 
     threading.Thread(target=answer, daemon=True).start()
     run(open_page(plugins, port=port, host=host), ended.is_set)
+
+
+LONG_LANE: Final = lane(
+    boxes=[{"at": (15.0, 0.0, -0.5), "size": (40.0, 8.0, 1.0)}],
+    finish={"at": (30.0, 0.0, 0.5), "size": (0.5, 6.0, 1.0)},
+)
+"""While a slow machine lets go of a key, the game goes on: no push is to end at the finish."""
 
 
 class TimedScreen(ScreenPlugin):
@@ -221,7 +211,7 @@ def _game() -> tuple[Plugins, Asked]:
     """Make a game on the lane."""
     witness = Witness()
     choices = Choices((Choice("lane", "Lane"),), "lane")
-    session = game(started=False, observers=[witness])
+    session = game(LONG_LANE, started=False, observers=[witness])
     plugin = GamePlugin(lambda _: session, choices, CoinSound(muted=True), "low")
     screen = TimedScreen(choices)
 
@@ -231,7 +221,7 @@ def _game() -> tuple[Plugins, Asked]:
             phase=frame.phase,
             episode=frame.episode,
             ball_x=float(frame.after[frame.ball]),
-            pushed=bool(np.any(force)),
+            pushed=frame.phase is Phase.PLAYING and bool(np.any(force)),
             coins=frame.result.coins,
             success=frame.result.success,
             camera=screen.camera.mode,
@@ -252,100 +242,3 @@ def _replay() -> tuple[Plugins, Asked]:
         return ReplayStatus(session.phase, session.time_s, session.duration_s)
 
     return (plugin, screen), asked
-
-
-_FRAMES_OF_A_RELEASE = 4
-_FRAMES_PASS = """async count => {
-    while (count--) await new Promise(requestAnimationFrame)
-}"""
-
-
-class Browser:
-    """One page of the browser, with the game or the replay on it."""
-
-    def __init__(self, chromium: Any, stand: HasUrl, *, controls: bool = True) -> None:
-        self._context = chromium.new_context(viewport=SIZE)
-        self.page = self._context.new_page()
-        self.page.set_default_timeout(1000.0 * PATIENCE_S)
-        self.keyboard = self.page.keyboard
-        log: list[str] = []
-        self.page.on("console", lambda message: log.append(message.text))
-        self.page.goto(stand.url)
-        # Studio's page tells its console what it has.
-        telling = "First remote draw frame" if controls else "scene initialized"
-        self.wait("the page is there", lambda: any(telling in line for line in log))
-        self.wait("it draws the level", lambda: colours(self.picture()[SCENE]) > 500)
-
-    def picture(self) -> Picture:
-        """Return what is seen, (height, width, 3)."""
-        with Image.open(io.BytesIO(self.page.screenshot())) as image:
-            return np.asarray(image.convert("RGB")).astype(np.int64)
-
-    def settled(self) -> Picture:
-        """Return what is seen when it no longer changes, but for a coin that turns."""
-        seen = [self.picture()]
-
-        def still() -> bool:
-            seen.append(self.picture())
-            return differing(seen[-2][SCENE], seen[-1][SCENE]) < 0.02
-
-        self.wait("the picture is still", still)
-        return seen[-1]
-
-    def wait(self, what: str, holds: Callable[[], bool]) -> None:
-        """Wait until something holds, while the page goes on."""
-        wait_for(what, holds, lambda: self.page.wait_for_timeout(20))
-
-    def wait_for_change(self, what: str, before: Picture, part: Any, share: float = 0.02) -> None:
-        """Wait until more than a share of a part's pixels are not as they were ``before``."""
-        self.wait(what, lambda: differing(self.picture()[part], before) > share)
-
-    def press(self, key: str, what: str, holds: Callable[[], bool]) -> None:
-        """Press a key until it has its effect, and let it go until the page has seen that too.
-
-        A page that draws slowly reads its keys slowly: it takes a key that is let go and pressed
-        again between two of its frames for one that was held.
-        """
-        self.keyboard.down(key)
-        self.wait(what, holds)
-        self.keyboard.up(key)
-        self.page.evaluate(_FRAMES_PASS, _FRAMES_OF_A_RELEASE)
-
-    def close(self) -> None:
-        """Leave the page."""
-        self._context.close()
-
-
-def differing(first: Picture, second: Picture) -> float:
-    """Return the share of pixels that are clearly not the same."""
-    return float((np.abs(first - second).max(axis=-1) > 24).mean())
-
-
-def colours(part: Picture) -> int:
-    """Return how many different colours there are."""
-    return len(np.unique(part.reshape(-1, 3), axis=0))
-
-
-def dark(part: Picture) -> float:
-    """Return the share of pixels as dark as a panel."""
-    return float((part.max(axis=-1) < 110).mean())
-
-
-def gold_pixels(part: Picture) -> npt.NDArray[np.bool_]:
-    """Say which pixels are of the gold of the points and of the time line's grab."""
-    red, green, blue = (part[..., channel] for channel in range(3))
-    of_gold: npt.NDArray[np.bool_] = (red > 180) & (green > 130) & (blue < 120)
-    return of_gold
-
-
-def gold(part: Picture) -> int:
-    """Return how many pixels are of that gold."""
-    return int(gold_pixels(part).sum())
-
-
-needs_a_steady_browser = pytest.mark.skipif(
-    "ROLLER_STEADY_BROWSER" not in os.environ,
-    reason="in vain in one run of three where software draws two pages at once: set "
-    "ROLLER_STEADY_BROWSER=1 and run tests/play on one worker",
-)
-"""For tests that wait for a picture to follow the mouse or a key in a replay or a recorded game."""

@@ -12,6 +12,7 @@ from mujoco.studio.endpoints import ViewerEndpoint
 from mujoco.studio.launch_thread import make_thread_endpoints
 from mujoco.studio.viewer_handle import ViewerHandle
 
+from roller_env.play import app
 from roller_env.play.app import (
     KEYS_GO_STALE_S,
     Choices,
@@ -24,6 +25,7 @@ from roller_env.play.app import (
 from roller_env.play.panels import Choice, Command, Wish
 from roller_env.play.session import Phase
 from roller_env.play.sound import CoinSound
+from tests.patience import STALLED_S
 from tests.play.lane import Witness, game
 
 LEVELS = ("lane", "other")
@@ -67,7 +69,11 @@ def table() -> Table:
     return table
 
 
-def test_the_first_step_after_a_key_is_told_is_made_with_it(table: Table) -> None:
+def test_the_first_step_after_a_key_is_told_is_made_with_it(
+    table: Table, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # However long this process has to wait for a processor.
+    monkeypatch.setattr(app, "KEYS_GO_STALE_S", STALLED_S)
     before, told_s = table.steps(), time.monotonic()
     table.viewer.send_to_sim(KeysSnapshot("w", told_s))
     frame = table.look()

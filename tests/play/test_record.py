@@ -19,14 +19,12 @@ from roller_env.replay import load_replay, verify
 from roller_env.training.behaviour_cloning import start_from_demonstrations
 from roller_env.training.demonstrations import load_demonstrations
 from roller_env.training.files import RunFiles
-from tests.play.stand import (
-    Browser,
-    free_port,
-    is_served,
-    needs_a_steady_browser,
-    wait_for,
-)
+from tests.patience import STALLED_S
+from tests.play.browser import SCENE, Browser
+from tests.play.stand import free_port, is_served, wait_until_served
 from tests.training.small import small_config
+
+pytestmark = pytest.mark.xdist_group("browser")
 
 ROOT = Path(__file__).parents[2]
 
@@ -48,16 +46,15 @@ class Game:
 
     def is_served(self) -> bool:
         assert self._process.poll() is None, self._process.communicate()[0]
-        return is_served(LOOPBACK, self.port)
+        return is_served(self.url)
 
     def end(self, number: signal.Signals) -> tuple[int, str]:
         """End it with a signal, and return its status and what it wrote."""
         self._process.send_signal(number)
-        output, _ = self._process.communicate(timeout=60)
+        output, _ = self._process.communicate(timeout=STALLED_S)
         return self._process.returncode, output
 
 
-@needs_a_steady_browser
 def test_what_is_played_with_the_keys_is_recorded_and_can_be_learnt_from(
     chromium: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -73,14 +70,17 @@ def test_what_is_played_with_the_keys_is_recorded_and_can_be_learnt_from(
         "--record=roller/human",
         f"--replays={replays}",
     )
-    wait_for("the page is served", game.is_served)
+    wait_until_served(game.is_served)
     browser = Browser(chromium, game)
     # With R, one game ends and the next begins: one of each ends up in a file.
-    browser.keyboard.press("Enter", delay=1000)
+    browser.tap("Enter")
     for number in range(2):
-        browser.keyboard.press("w", delay=1500)
+        at_rest = browser.settled()[SCENE]
+        browser.keyboard.down("w")
+        browser.wait_for_change("the ball rolls", at_rest, SCENE)
+        browser.keyboard.up("w")
         browser.press("r", "a game is over", written(replays, number + 1))
-    browser.keyboard.press("d", delay=500)
+    browser.tap("d")
     # As when the terminal is closed.
     status, output = game.end(signal.SIGTERM)
     browser.close()
@@ -89,7 +89,9 @@ def test_what_is_played_with_the_keys_is_recorded_and_can_be_learnt_from(
     files = [Path(file) for file in re.findall("replay: (.*)", output)]
     assert files == sorted(replays.glob("*.replay"))
     played = [load_replay(file) for file in files]
-    assert all(verify(replay).is_exact for replay in played)
+    for replay in played:
+        verdict = verify(replay)
+        assert verdict.is_exact, str(verdict)
     assert {replay.player for replay in played} == {"human"}
     pushed = [replay.force_n for replay in played[:2]]
     assert all((force[:, 0] > 0.0).any() for force in pushed)
@@ -119,7 +121,7 @@ def test_a_name_that_no_data_set_can_have_is_refused_before_anything_is_played()
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=STALLED_S,
     )
     assert done.returncode == 1
     assert done.stderr.startswith("error: record: found 'my games'")

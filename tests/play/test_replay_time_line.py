@@ -10,18 +10,10 @@ import numpy as np
 import pytest
 
 from roller_env.play.session import Phase
-from tests.play.stand import (
-    MIDDLE,
-    SCENE,
-    TIME_LINE,
-    Browser,
-    ReplayStand,
-    dark,
-    gold_pixels,
-    needs_a_steady_browser,
-)
+from tests.play.browser import MIDDLE, SCENE, TIME_LINE, Browser, dark, gold_pixels
+from tests.play.stand import ReplayStand
 
-pytestmark = needs_a_steady_browser
+pytestmark = pytest.mark.xdist_group("browser")
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +26,10 @@ def person(chromium: Any, replay_stand: ReplayStand) -> Iterator[Browser]:
 @pytest.fixture
 def page(person: Browser, replay_stand: ReplayStand) -> Browser:
     """The page, standing still at the start."""
-    person.press("r", "it plays", lambda: replay_stand.status.phase is Phase.PLAYING)
-    person.press("p", "it stands still", lambda: replay_stand.status.phase is Phase.PAUSED)
+    # However long the page takes to draw, and the replay goes on meanwhile.
+    if replay_stand.status.phase is Phase.PLAYING:
+        person.press("p", "it stands still", lambda: replay_stand.status.phase is Phase.PAUSED)
+    person.press("ArrowLeft", "it is at the start", lambda: replay_stand.status.time_s == 0.0)
     return person
 
 
@@ -44,7 +38,7 @@ def grab(page: Browser) -> tuple[float, float]:
 
     (0, 0) while none is seen.
     """
-    rows, columns = np.nonzero(gold_pixels(page.picture()[TIME_LINE]))
+    rows, columns = np.nonzero(gold_pixels(page.picture[TIME_LINE]))
     if len(rows) == 0:
         return 0.0, 0.0
     return float(columns.mean()) + TIME_LINE[1].start, float(rows.mean()) + TIME_LINE[0].start
@@ -71,15 +65,15 @@ def dragged(page: Browser, begin_x: float, end_x: float, y: float) -> Iterator[N
     """Drag with the mouse, and let go at the end."""
     mouse = page.page.mouse
     mouse.move(begin_x, y)
-    # A page that draws slowly reads the mouse slowly.
-    page.page.wait_for_timeout(300)
+    page.tell()
     mouse.down()
+    page.tell()
     try:
-        page.page.wait_for_timeout(300)
         mouse.move(end_x, y, steps=4)
         yield
     finally:
         mouse.up()
+        page.tell()
 
 
 def test_arrow_keys_go_a_second_forward_and_back(page: Browser, replay_stand: ReplayStand) -> None:
@@ -100,5 +94,5 @@ def test_space_lets_it_play_and_stand_still(page: Browser, replay_stand: ReplayS
 
 def test_h_shows_the_keys_of_a_replay_and_hides_them(page: Browser) -> None:
     before = dark(page.settled()[MIDDLE])
-    page.press("h", "the help is there", lambda: dark(page.picture()[MIDDLE]) > before + 0.4)
-    page.press("h", "it is gone", lambda: dark(page.picture()[MIDDLE]) < before + 0.1)
+    page.press("h", "the help is there", lambda: dark(page.picture[MIDDLE]) > before + 0.4)
+    page.press("h", "it is gone", lambda: dark(page.picture[MIDDLE]) < before + 0.1)

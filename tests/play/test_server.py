@@ -13,7 +13,10 @@ from websockets.typing import Origin
 
 from roller_env.play import server
 from roller_env.play.server import PlayError, open_page, open_window, run, warning_of
+from tests.patience import STALLED_S
 from tests.play.stand import Stand
+
+pytestmark = pytest.mark.xdist_group("browser")
 
 LISTEN = "0A"
 """State of a listening socket in /proc/net/tcp."""
@@ -64,7 +67,7 @@ def test_a_page_from_elsewhere_is_refused(stand: Stand, path: str, origin: str) 
 def test_the_games_own_page_is_let_in_also_through_a_tunnel(stand: Stand, name: str) -> None:
     origin = f"http://{name}:9999"
     with connect(f"ws://127.0.0.1:{stand.port}/state", origin=Origin(origin)) as state:
-        assert "role=" in str(state.recv(timeout=30))
+        assert "role=" in str(state.recv(timeout=STALLED_S))
 
 
 def test_a_port_that_is_taken_is_said_to_be() -> None:

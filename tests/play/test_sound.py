@@ -13,6 +13,7 @@ import pytest
 from roller_env.assets import asset_directory
 from roller_env.play.sound import COIN, SAMPLE_RATE_HZ, CoinSound
 from scripts import make_sounds
+from tests.patience import STALLED_S
 
 
 def samples(path: Path) -> np.ndarray:
@@ -69,7 +70,7 @@ def in_a_process(*arguments: str, **environment: str) -> subprocess.CompletedPro
         [sys.executable, "-c", PLAY, *arguments],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=STALLED_S,
         env={**os.environ, **environment},
         check=False,
     )

@@ -20,6 +20,7 @@ from roller_env.rigid_body import (
     INTEGRATORS,
     LIE_RK4,
     RK4,
+    RK4_BODY,
     SEMI_IMPLICIT_EULER,
     SPLITTING2,
     SPLITTING4,
@@ -57,6 +58,9 @@ from tests.rigid_body.bodies import (
 )
 
 METHODS = list(INTEGRATORS.values())
+RAW_RK4 = RungeKutta4(renormalise=False, renormalise_stages=False)
+"""Four numbers added like any others, and never made a rotation again."""
+
 every_method = pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
 
 STEPS = {1: (50, 100, 200, 400), 2: (20, 40, 80, 160), 3: (60, 120, 240, 480), 4: (10, 20, 40, 80)}
@@ -164,7 +168,9 @@ def test_a_body_that_blows_up_leaves_its_neighbours_alone(method: Integrator) ->
 # --- what is conserved -----------------------------------------------------------------------
 
 
-@every_method
+@pytest.mark.parametrize(
+    "method", [one for one in METHODS if one is not RK4_BODY], ids=lambda method: method.name
+)
 @EXAMPLES
 @given(state=states(boxes(2)))
 def test_angular_momentum_is_conserved_to_the_last_bit(method: Integrator, state: State) -> None:
@@ -269,9 +275,7 @@ def test_explicit_euler_stretches_the_quaternion_every_step(angle: float) -> Non
 def test_runge_kutta_shrinks_the_quaternion_by_its_stability_polynomial(angle: float) -> None:
     z = angle / 2.0
     polynomial = math.sqrt(1.0 - z**6 / 72.0 + z**8 / 576.0)
-    assert norm_after_a_step(RungeKutta4(renormalise=False), angle) == pytest.approx(
-        polynomial, rel=2e-15, abs=2e-15
-    )
+    assert norm_after_a_step(RAW_RK4, angle) == pytest.approx(polynomial, rel=2e-15, abs=2e-15)
 
 
 @pytest.mark.parametrize(("stages", "share"), [(False, 1.0), (True, 5.0 / 8.0)])
@@ -284,6 +288,18 @@ def test_runge_kutta_loses_the_predicted_norm_before_renormalising(
         assert 1.0 - norm_after_a_step(method, angle) == pytest.approx(
             predicted, rel=1e-2, abs=4e-16
         )
+
+
+def test_the_reports_method_recalculates_whenever_primary_values_change() -> None:
+    seen: list[State] = []
+
+    def watching(state: State, t: float) -> Wrench:
+        seen.append(state)
+        return none(state, t)
+
+    INTEGRATORS["rk4"].step(spinning(2.0), derivative_of(watching), 0.0, 0.5)
+    norms = [float(quaternion.norm(state.orientation)[0]) for state in seen]
+    assert norms == pytest.approx([1.0] * 4, abs=1e-15)
 
 
 @pytest.mark.parametrize(("stages", "share"), [(False, 1.0), (True, 3.0 / 8.0)])
@@ -351,8 +367,7 @@ def test_drag_blows_up_beyond_the_predicted_step(method: Integrator, limit: floa
 
 
 def test_runge_kutta_without_renormalising_diverges_above_four_root_two() -> None:
-    raw = RungeKutta4(renormalise=False)
-    limit = bisected(lambda angle: norm_after_a_step(raw, angle) > 1.0, 4.0, 7.0)
+    limit = bisected(lambda angle: norm_after_a_step(RAW_RK4, angle) > 1.0, 4.0, 7.0)
     assert limit == pytest.approx(4.0 * math.sqrt(2.0), rel=1e-9)
 
 
@@ -381,7 +396,7 @@ def test_explicit_euler_feeds_every_oscillation_and_the_symplectic_methods_do_no
 
 
 def velocity_form(state: State, dt: float, steps: int, load: Load) -> State:
-    """Integrate velocity and angular velocity instead of momenta, by classical Runge-Kutta.
+    """Integrate velocity and angular velocity instead of momenta, by the textbook's Runge-Kutta.
 
     The other way to write the same equations: m v' = F and I w' = torque - w x (I w).
     """
@@ -424,7 +439,9 @@ def test_on_a_cube_momentum_form_and_velocity_form_are_the_same_but_for_rounding
         push_at((1, 2, -1), (0.1, 0, 0.2)),
         lambda s, _t: Wrench(-0.2 * s.momentum, -0.3 * s.angular_momentum),
     )
-    ours, other = advance(state, RK4, 0.01, 10, load=load), velocity_form(state, 0.01, 10, load)
+    textbook = RungeKutta4(renormalise_stages=False)
+    ours = advance(state, textbook, 0.01, 10, load=load)
+    other = velocity_form(state, 0.01, 10, load)
     np.testing.assert_allclose(ours.position, other.position, rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(ours.momentum, other.momentum, rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(ours.angular_velocity, other.angular_velocity, rtol=1e-9, atol=1e-9)

@@ -80,7 +80,7 @@ def test_a_drawn_body_is_where_the_exact_motion_was_one_step_ago(
     truth = exact.projectile(exact.constant_spin(thrown, shown_s), shown_s, GRAVITY)
     # A chord leaves a parabola by a h^2 / 8 at most; the rest is the drift of float64 sums.
     assert np.abs(drawn.position - truth.position).max() <= 9.8044 * STEP_S**2 / 8.0 + 1e-9
-    late = clock * spin * (spin * STEP_S) ** 4 / 1920.0
+    late = clock * spin * (spin * STEP_S) ** 4 / 5120.0
     assert quaternion.angle_between(drawn.orientation, truth.orientation)[0] <= late + 1e-8
 
 

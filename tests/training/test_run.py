@@ -25,11 +25,11 @@ from roller_env.training.logs import STEPS, read_progress
 from roller_env.training.policy import TrainedPolicy, load_policy
 from roller_env.training.ppo import learn, make_environments, new_model
 from roller_env.training.run import evaluate_policy, train
+from tests.patience import STALLED_S
 from tests.training.disk import largest_file
 from tests.training.small import UPDATES, small_config
 
 ROOT = Path(__file__).parents[2]
-TIMEOUT_S = 120.0
 
 
 @pytest.fixture(autouse=True)
@@ -59,14 +59,14 @@ def start(config: Path, runs: Path) -> subprocess.Popen[str]:
 
 
 def finish(process: subprocess.Popen[str]) -> str:
-    output, _ = process.communicate(timeout=TIMEOUT_S)
+    output, _ = process.communicate(timeout=STALLED_S)
     assert process.returncode == 0, output
     return output
 
 
 def kill_once(process: subprocess.Popen[str], file: Path, rows: int) -> None:
     """Kill a training, without warning, when its log has so many rows."""
-    deadline = time.monotonic() + TIMEOUT_S
+    deadline = time.monotonic() + STALLED_S
     while len(read_progress(file)) < rows:
         assert process.poll() is None, process.communicate()[0]
         assert time.monotonic() < deadline

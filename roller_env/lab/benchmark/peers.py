@@ -1,4 +1,4 @@
-"""Other environments as contestants, each in an interpreter of the peers' own environment."""
+"""Other environments as benchmark cases, each in an interpreter of the peers' own environment."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
-from roller_env.lab.benchmark.race import Contestant
+from roller_env.lab.runner import Case
 
 INTERPRETER: Final = Path(".venv-peers/bin/python")
 """Where ``make benchmark`` puts the peers."""
@@ -21,7 +21,7 @@ class PeerError(RuntimeError):
     """A peer's environment is there but does not work."""
 
 
-class Peer(Contestant):
+class Peer(Case):
     """An environment of `peer_worker`, stepped over a pipe; the pipe's time is not counted.
 
     Attributes:

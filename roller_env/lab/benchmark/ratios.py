@@ -1,40 +1,47 @@
-"""The ratios that the project promises, measured."""
+"""The ratios that the project promises, measured, and how they stand to their goals."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
-from roller_env.lab.benchmark.breakdown import PartRow, where_the_time_goes
-from roller_env.lab.benchmark.contestants import (
+import pandas as pd
+from matplotlib.figure import Figure
+
+from roller_env.lab import chart
+from roller_env.lab.benchmark.breakdown import where_the_time_goes
+from roller_env.lab.benchmark.cases import (
     BareLoop,
     BatchAlone,
     SingleStep,
-    VectorStep,
-    check_options,
-)
-from roller_env.lab.benchmark.goals import NOT_MEASURED, GoalRow, Sense, judge
-from roller_env.lab.benchmark.peers import Peer
-from roller_env.lab.benchmark.race import (
-    Contestant,
-    Median,
-    Pace,
-    Result,
-    race,
-    simulated_ratio,
-    speed_ratio,
-)
-from roller_env.lab.benchmark.training import (
     Training,
+    VectorStep,
     as_make_train_does,
+    check_options,
     with_roller_vec_env,
     with_subproc_vec_env,
 )
+from roller_env.lab.benchmark.peers import Peer
+from roller_env.lab.runner import (
+    Case,
+    Config,
+    Median,
+    Result,
+    compare,
+    simulated_ratio,
+    speed_ratio,
+)
+from roller_env.lab.table import Frame, frame, markdown
 from roller_env.training.config import TrainingConfig
+
+Sense = Literal["at least", "at most"]
+
+NOT_MEASURED: Final = Median(math.nan, math.nan, math.nan)
 
 FEW_ENVS: Final = 64
 MANY_ENVS: Final = 1024
@@ -52,6 +59,29 @@ _FEW: Final = f"Roller, {FEW_ENVS} environments"
 _MANY: Final = f"Roller, {MANY_ENVS} environments"
 
 
+def judge(
+    comparison: str, sense: Sense, goal: float, measured: Median, rounds: int = 1
+) -> dict[str, Any]:
+    """Return the row of a goal; `NOT_MEASURED` is no failure, but no success either.
+
+    Returns:
+        ``comparison``, ``sense``, ``goal``, ``measured`` with ``smallest`` and ``largest`` of the
+        ``rounds``, and the ``verdict``: met, missed or not measured.
+    """
+    value = measured.value
+    verdict = "met" if (value >= goal if sense == "at least" else value <= goal) else "missed"
+    return {
+        "comparison": comparison,
+        "sense": sense,
+        "goal": goal,
+        "measured": value,
+        "smallest": measured.low,
+        "largest": measured.high,
+        "rounds": 0 if math.isnan(value) else rounds,
+        "verdict": "not measured" if math.isnan(value) else verdict,
+    }
+
+
 @dataclass(frozen=True, slots=True)
 class Goal:
     """A number that is to be reached.
@@ -60,7 +90,7 @@ class Goal:
         title: what is compared, for a table.
         bound: the goal.
         sense: on which side of it.
-        ours: the contestant whose number is to be good.
+        ours: the case whose number is to be good.
         theirs: the one that it is measured against; none for a number of its own.
         measure: of the two results.
     """
@@ -72,14 +102,23 @@ class Goal:
     theirs: str | None
     measure: Callable[[Result, Result], Median] = speed_ratio
 
+    def row(self, results: Mapping[str, Result]) -> dict[str, Any]:
+        """Return the row of what was measured."""
+        ours, theirs = results[self.ours], results.get(self.theirs or self.ours)
+        measured = NOT_MEASURED if theirs is None else self.measure(ours, theirs)
+        return judge(self.title, self.sense, self.bound, measured, len(ours.seconds))
+
 
 def _cost_ratio(ours: Result, theirs: Result) -> Median:
     return speed_ratio(theirs, ours)
 
 
 def _thousands_a_second(ours: Result, _: Result) -> Median:
-    return Median.of([1e-3 / seconds for seconds in ours.seconds])
+    return ours.env_steps_per_s.times(1e-3)
 
+
+_SIZES: Final = f"cost an environment step, {MANY_ENVS:,} environments to {FEW_ENVS}"
+_TRAIN: Final = "make train's PPO, thousand environment steps/s"
 
 GOALS: Final = (
     Goal("whole vector step to Batch alone", 0.85, "at least", _VECTOR, _BATCH),
@@ -88,50 +127,17 @@ GOALS: Final = (
     Goal("environment steps to EnvPool", 2.0, "at least", _VECTOR, _ENVPOOL),
     Goal("one environment to gymnasium-robotics", 1.0, "at least", _SINGLE, _ROBOTICS),
     Goal("PPO on RollerVecEnv to PPO on SubprocVecEnv", 4.0, "at least", _ROLLER_PPO, _SUBPROC_PPO),
-    Goal(
-        f"cost an environment step, {MANY_ENVS:,} environments to {FEW_ENVS}",
-        1.1,
-        "at most",
-        _MANY,
-        _FEW,
-        _cost_ratio,
-    ),
-    Goal(
-        "make train's PPO, thousand environment steps/s",
-        20.0,
-        "at least",
-        _MAKE_TRAIN,
-        None,
-        _thousands_a_second,
-    ),
+    Goal(_SIZES, 1.1, "at most", _MANY, _FEW, _cost_ratio),
+    Goal(_TRAIN, 20.0, "at least", _MAKE_TRAIN, None, _thousands_a_second),
 )
 
 
 @dataclass(frozen=True, slots=True)
-class SpeedRow:
-    """How fast one contestant was.
-
-    Attributes:
-        contestant: who.
-        env_steps_per_s: environment steps a wall second, median over the rounds.
-        spread: (largest - smallest) / median.
-        simulated_s_per_s: simulated seconds a wall second.
-        rounds: how many.
-    """
-
-    contestant: str
-    env_steps_per_s: float
-    spread: float
-    simulated_s_per_s: float
-    rounds: int
-
-
-@dataclass(frozen=True, slots=True)
 class Task:
-    """What is raced.
+    """What is run.
 
     Attributes:
-        pace: how long.
+        config: how long.
         options: of all our environments, see `roller_env.config.EnvConfig`.
         num_envs: of the vectors.
         num_threads: native threads of the vectors, EnvPool's among them.
@@ -141,7 +147,7 @@ class Task:
         peers: Python with the peers installed; None leaves them out.
     """
 
-    pace: Pace
+    config: Config
     options: Mapping[str, Any]
     num_envs: int
     num_threads: int
@@ -153,138 +159,174 @@ class Task:
         """Refuse options that no environment takes."""
         check_options(self.options)
 
+    def vector(self, _: ExitStack) -> VectorStep:
+        """Return the vector of many environments."""
+        return VectorStep(_VECTOR, self.num_envs, self.num_threads, **self.options)
+
+    def single(self, _: ExitStack) -> SingleStep:
+        """Return one environment."""
+        return SingleStep(_SINGLE, **self.options)
+
+    def make_train(self, stack: ExitStack) -> Training:
+        """Return what ``make train`` does."""
+        return stack.enter_context(as_make_train_does(_MAKE_TRAIN, self.training))
+
+    def _peer(self, stack: ExitStack, name: str, **wanted: Any) -> list[Case]:
+        if self.peers is None:
+            return []
+        return [stack.enter_context(Peer(name, self.peers, **wanted))]
+
+    def runs(self) -> dict[str, Callable[[ExitStack], list[Case]]]:
+        """Return what opens the cases of each interleaved run, by what is said of it."""
+
+        def trainings(stack: ExitStack) -> list[Case]:
+            count, threads = self.training_envs, self.num_threads
+            theirs = with_subproc_vec_env(_SUBPROC_PPO, count, **self.options)
+            ours = with_roller_vec_env(_ROLLER_PPO, count, threads, **self.options)
+            return [stack.enter_context(theirs), stack.enter_context(ours)]
+
+        def vectors(stack: ExitStack) -> list[Case]:
+            ours = self.vector(stack)
+            sizes = {"num_envs": self.num_envs, "num_threads": self.num_threads}
+            peer = self._peer(stack, _ENVPOOL, peer="envpool", **sizes)
+            return [ours, BatchAlone(_BATCH, ours), *peer]
+
+        def singles(stack: ExitStack) -> list[Case]:
+            ours = self.single(stack)
+            peer = self._peer(stack, _ROBOTICS, peer="gymnasium-robotics")
+            return [ours, BareLoop(_LOOP, ours), *peer]
+
+        def sizes(_: ExitStack) -> list[Case]:
+            return [
+                VectorStep(name, count, self.num_threads, **self.options)
+                for name, count in ((_FEW, FEW_ENVS), (_MANY, MANY_ENVS))
+            ]
+
+        return {
+            # First, while there are no threads that a fork could cut off.
+            "training: RollerVecEnv, SubprocVecEnv": trainings,
+            "vector steps": vectors,
+            "one environment": singles,
+            f"{FEW_ENVS} and {MANY_ENVS} environments": sizes,
+            "make train": lambda stack: [self.make_train(stack)],
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class Ratios:
     """All that was measured.
 
     Attributes:
-        rows: a row for each of `GOALS`, in their order.
-        speeds: of every contestant.
+        goals: a row for each of `GOALS`, in their order; see `judge`.
+        speeds: of every case: ``case``, ``env_steps_per_s`` (median), ``spread``,
+            ``simulated_s_per_s`` and ``rounds``.
         versions: of the peers' packages.
     """
 
-    rows: tuple[GoalRow, ...]
-    speeds: tuple[SpeedRow, ...]
+    goals: Frame
+    speeds: Frame
     versions: dict[str, str]
 
 
 def measure(task: Task, say: Callable[[str], None]) -> Ratios:
-    """Run all races.
-
-    Args:
-        task: what is raced.
-        say: is told what begins.
-    """
+    """Run everything interleaved; ``say`` is told what begins."""
     results: dict[str, Result] = {}
     versions: dict[str, str] = {}
-    for title, enter in _RACES.items():
+    for title, enter in task.runs().items():
         say(title)
-        with ExitStack() as open_contestants:
-            contestants = enter(task, open_contestants)
-            results |= race(contestants, task.pace)
-            for contestant in contestants:
-                if isinstance(contestant, Peer):
-                    versions |= contestant.versions
+        with ExitStack() as stack:
+            cases = enter(stack)
+            results |= compare(cases, task.config)
+            for case in cases:
+                versions |= case.versions if isinstance(case, Peer) else {}
     return Ratios(
-        rows=tuple(_row(goal, results) for goal in GOALS),
-        speeds=tuple(_speed(result) for result in results.values()),
+        goals=frame([goal.row(results) for goal in GOALS]),
+        speeds=frame([_speed(result) for result in results.values()]),
         versions=versions,
     )
 
 
-def profile(task: Task, say: Callable[[str], None]) -> list[PartRow]:
+def _speed(result: Result) -> dict[str, Any]:
+    speed = result.env_steps_per_s
+    return {
+        "case": result.case.name,
+        "env_steps_per_s": speed.value,
+        "spread": speed.spread,
+        "simulated_s_per_s": speed.value * result.case.simulated_s,
+        "rounds": len(result.seconds),
+    }
+
+
+def profile(task: Task, say: Callable[[str], None]) -> Frame:
     """Say where the time goes in a vector step, in a single one and in training."""
-    rows: list[PartRow] = []
-    for what, enter in _PROFILES.items():
+    found = []
+    steps: dict[str, Callable[[ExitStack], Case]] = {
+        "vector step": task.vector,
+        "one environment": task.single,
+        "make train": task.make_train,
+    }
+    for what, enter in steps.items():
         say(f"where the time goes: {what}")
         with ExitStack() as stack:
-            contestant = enter(task, stack)
-            steps = task.pace.rounds * contestant.prepare(task.pace)
-            work = partial(contestant.run, steps)
-            rows += where_the_time_goes(what, work, steps * contestant.env_steps)
-    return rows
+            case = enter(stack)
+            count = task.config.rounds * case.prepare(task.config)
+            work = partial(case.run, count)
+            found.append(where_the_time_goes(what, work, count * case.env_steps))
+    return pd.concat(found, ignore_index=True)
 
 
-def _vector(task: Task, _: ExitStack) -> VectorStep:
-    return VectorStep(_VECTOR, task.num_envs, task.num_threads, **task.options)
+# --- pictures and tables ---------------------------------------------------------------------
 
 
-def _single(task: Task, _: ExitStack) -> SingleStep:
-    return SingleStep(_SINGLE, **task.options)
+def draw_goals(goals: Frame, title: str) -> Figure:
+    """Draw what was measured against its goal, better to the right."""
 
+    def reached(row: Any, value: float) -> float:
+        return float(value / row.goal if row.sense == "at least" else row.goal / value)
 
-def _make_train(task: Task, stack: ExitStack) -> Training:
-    return stack.enter_context(as_make_train_does(_MAKE_TRAIN, task.training))
-
-
-def _enter_vectors(task: Task, stack: ExitStack) -> list[Contestant]:
-    ours = _vector(task, stack)
-    entered: list[Contestant] = [ours, BatchAlone(_BATCH, ours)]
-    if task.peers is not None:
-        sizes = {"num_envs": task.num_envs, "num_threads": task.num_threads}
-        entered.append(stack.enter_context(Peer(_ENVPOOL, task.peers, peer="envpool", **sizes)))
-    return entered
-
-
-def _enter_singles(task: Task, stack: ExitStack) -> list[Contestant]:
-    ours = _single(task, stack)
-    entered: list[Contestant] = [ours, BareLoop(_LOOP, ours)]
-    if task.peers is not None:
-        peer = Peer(_ROBOTICS, task.peers, peer="gymnasium-robotics")
-        entered.append(stack.enter_context(peer))
-    return entered
-
-
-def _enter_sizes(task: Task, _: ExitStack) -> list[Contestant]:
-    return [
-        VectorStep(name, num_envs, task.num_threads, **task.options)
-        for name, num_envs in ((_FEW, FEW_ENVS), (_MANY, MANY_ENVS))
+    rows = [
+        chart.Row(
+            row.comparison,
+            reached(row, row.measured),
+            (reached(row, row.smallest), reached(row, row.largest)),
+            row.verdict == "met",
+            said=f"{row.measured:.3g}, {'≥' if row.sense == 'at least' else '≤'} {row.goal:g}",
+        )
+        for row in goals.itertuples()
     ]
+    note = "Green: the goal is reached. At the right what was measured, and the goal."
+    xlabel = "times the goal, better to the right; grey: the range of the rounds"
+    return chart.against_limits(rows, title, note, xlabel, (0.05, 20.0))
 
 
-def _enter_trainings(task: Task, stack: ExitStack) -> list[Contestant]:
-    count, options = task.training_envs, task.options
-    trainings = [
-        with_subproc_vec_env(_SUBPROC_PPO, count, **options),
-        with_roller_vec_env(_ROLLER_PPO, count, task.num_threads, **options),
+def goals_table(goals: Frame) -> str:
+    """Return how the goals stand, as Markdown."""
+    cells = [
+        (
+            row.comparison,
+            f"{row.sense} {row.goal:g}",
+            f"{row.measured:.3g}" if row.rounds else "",
+            f"{row.smallest:.3g} to {row.largest:.3g}" if row.rounds else "",
+            row.verdict,
+        )
+        for row in goals.itertuples()
     ]
-    return [stack.enter_context(training) for training in trainings]
+    return markdown(("", "goal", "measured", "range", "verdict"), cells)
 
 
-def _enter_make_train(task: Task, stack: ExitStack) -> list[Contestant]:
-    return [_make_train(task, stack)]
-
-
-_RACES: Final[dict[str, Callable[[Task, ExitStack], list[Contestant]]]] = {
-    # First, while there are no threads that a fork could cut off.
-    "training: RollerVecEnv, SubprocVecEnv": _enter_trainings,
-    "vector steps": _enter_vectors,
-    "one environment": _enter_singles,
-    f"{FEW_ENVS} and {MANY_ENVS} environments": _enter_sizes,
-    "make train": _enter_make_train,
-}
-
-
-_PROFILES: Final[dict[str, Callable[[Task, ExitStack], Contestant]]] = {
-    "vector step": _vector,
-    "one environment": _single,
-    "make train": _make_train,
-}
-
-
-def _row(goal: Goal, results: Mapping[str, Result]) -> GoalRow:
-    ours, theirs = results[goal.ours], results.get(goal.theirs or goal.ours)
-    measured = NOT_MEASURED if theirs is None else goal.measure(ours, theirs)
-    return judge(goal.title, goal.sense, goal.bound, measured, len(ours.seconds))
-
-
-def _speed(result: Result) -> SpeedRow:
-    speed = result.env_steps_per_s
-    return SpeedRow(
-        contestant=result.contestant.name,
-        env_steps_per_s=speed.value,
-        spread=speed.spread,
-        simulated_s_per_s=speed.value * result.contestant.simulated_s,
-        rounds=len(result.seconds),
+def report(measured: Ratios, parts: Frame) -> str:
+    """Return the goals, the cases and where the time goes, a table each."""
+    speeds = [
+        (row.case, f"{row.env_steps_per_s:,.0f}", f"{row.spread:.0%}", row.simulated_s_per_s)
+        for row in measured.speeds.itertuples()
+    ]
+    shares = [
+        (row.what, row.part, f"{row.share:.1%}", row.us_per_env_step) for row in parts.itertuples()
+    ]
+    return "\n".join(
+        (
+            goals_table(measured.goals),
+            markdown(("case", "env steps/s", "spread", "simulated s/s"), speeds),
+            markdown(("step", "part", "share", "µs an env step"), shares),
+        )
     )

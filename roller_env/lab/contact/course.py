@@ -26,14 +26,15 @@ import numpy as np
 from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.compile.mjcf import build_spec
 from roller_env.config import make_config
-from roller_env.game.actions import KEY_FORCE_N, forces, held_keys
+from roller_env.game.actions import KEY_FORCE_N
 from roller_env.lab.contact.scene import ContactScene, Float64
-from roller_env.lab.contact.trial import Held, MujocoTrial, Path, steps_of
-from roller_env.lab.experiment import Measure
+from roller_env.lab.contact.trial import Held, MujocoTrial, steps_of
+from roller_env.lab.game import played
 from roller_env.lab.methods import MUJOCO, MujocoMethod
+from roller_env.lab.scene import Measure
+from roller_env.lab.simulate import Path
 from roller_env.level import Level, load_level
 from roller_env.physics.presets import PRESETS
-from roller_env.simulation import Simulation
 
 REFERENCE: Final = MujocoMethod("RK4")
 
@@ -174,21 +175,8 @@ def played_controls(level: str, keys: tuple[Pressed, ...]) -> tuple[Controlled, 
     config = make_config(
         level=load_level(level), physics="accurate", control_dt_s=CONTROL_DT_S, num_threads=1
     )
-    simulation = Simulation(config)
-    # Where the ball starts is drawn by lot: the same place in every process.
-    simulation.seed([np.random.default_rng(0)])
-    simulation.reset()
-    model = simulation.compiled.model
-    data = mujoco.MjData(model)
-    controls = []
-    for held in keys:
-        force = forces("keys", held_keys(held.keys)[None])
-        for _ in range(steps_of(held.seconds, CONTROL_DT_S)):
-            simulation.step(force)
-            state: Float64 = simulation.snapshot().physics[0]
-            mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
-            controls.append(Controlled(tuple(data.ctrl.tolist()), CONTROL_DT_S))
-    return tuple(controls)
+    _, ctrl = played(config, [(one.keys, one.seconds) for one in keys], seed=0)
+    return tuple(Controlled(tuple(row), CONTROL_DT_S) for row in ctrl.tolist())
 
 
 _GATE_MOMENTS_S: Final = (3.6, 2.4, 0.4)

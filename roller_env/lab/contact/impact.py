@@ -13,32 +13,25 @@ import mujoco
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from roller_env.lab.contact.scene import (
-    BALL_MASS_KG,
-    BALL_RADIUS_M,
-    GRAVITY_M_S2,
-    ContactScene,
-    Float64,
-    contact_of,
-    game_contact,
-    new_spec,
-)
-from roller_env.lab.contact.trial import Held, MujocoTrial, Path, steps_of
-from roller_env.lab.experiment import Measure
+from roller_env.lab.contact.scene import ContactScene, Float64, contact_of, game_contact, new_spec
+from roller_env.lab.contact.trial import Held, MujocoTrial, steps_of
+from roller_env.lab.game import GRAVITY_M_S2, MASS_KG, RADIUS_M
 from roller_env.lab.methods import MUJOCO, MujocoMethod
+from roller_env.lab.scene import Measure
+from roller_env.lab.simulate import Path
 from roller_env.physics.materials import IMPEDANCE, damping_ratio
 from roller_env.physics.presets import PhysicsPreset
 
 
 def add_falling_ball(spec: mujoco.MjSpec, name: str, x_m: float, **contact: Any) -> None:
     """Add a ball that can only move up and down; its joint's 0 is where it touches the ground."""
-    body = spec.worldbody.add_body(name=name, pos=[x_m, 0.0, BALL_RADIUS_M])
+    body = spec.worldbody.add_body(name=name, pos=[x_m, 0.0, RADIUS_M])
     body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0.0, 0.0, 1.0])
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        size=[BALL_RADIUS_M, 0.0, 0.0],
-        mass=BALL_MASS_KG,
+        size=[RADIUS_M, 0.0, 0.0],
+        mass=MASS_KG,
         condim=1,
         contype=1,
         conaffinity=0,

@@ -31,10 +31,6 @@ import numpy as np
 
 from roller_env.game.actions import KEY_FORCE_N
 from roller_env.lab.contact.scene import (
-    BALL_MASS_KG,
-    BALL_RADIUS_M,
-    FRICTION,
-    GRAVITY_M_S2,
     ContactScene,
     Float64,
     add_ball,
@@ -43,9 +39,11 @@ from roller_env.lab.contact.scene import (
     resting_depth,
     soft_contact,
 )
-from roller_env.lab.contact.trial import Held, MujocoTrial, Path, at_most, steps_of
-from roller_env.lab.experiment import Measure
+from roller_env.lab.contact.trial import Held, MujocoTrial, at_most, steps_of
+from roller_env.lab.game import FRICTION, GRAVITY_M_S2, MASS_KG, RADIUS_M
 from roller_env.lab.methods import MUJOCO, PYRAMIDAL, MujocoMethod
+from roller_env.lab.scene import Measure
+from roller_env.lab.simulate import Path
 
 REFERENCE: Final = MujocoMethod("RK4")
 """With a small step: what the same soft model does as the step vanishes."""
@@ -77,7 +75,7 @@ class SteadyRoll(ContactScene):
     def acceleration_m_s2(self) -> float:
         """Of a rigid ball: five sevenths of what it would be without friction."""
         pull = GRAVITY_M_S2 * math.sin(math.radians(self.slope_deg))
-        return 5.0 / 7.0 * (pull + self.force_n / BALL_MASS_KG)
+        return 5.0 / 7.0 * (pull + self.force_n / MASS_KG)
 
     @property
     def way_m(self) -> float:
@@ -97,7 +95,7 @@ class SteadyRoll(ContactScene):
             **contact,
         )
         depth = resting_depth(contact["solref"], GRAVITY_M_S2 * math.cos(angle))
-        add_ball(spec, ((BALL_RADIUS_M - depth) * normal).tolist())
+        add_ball(spec, ((RADIUS_M - depth) * normal).tolist())
 
         def push(data: mujoco.MjData) -> None:
             data.xfrc_applied[1, 0] = self.force_n
@@ -162,7 +160,7 @@ class Skid(ContactScene):
         spec = new_spec(method, dt_s, GRAVITY_M_S2)
         contact = game_contact()
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], **contact)
-        add_ball(spec, (0.0, 0.0, BALL_RADIUS_M - resting_depth(contact["solref"], GRAVITY_M_S2)))
+        add_ball(spec, (0.0, 0.0, RADIUS_M - resting_depth(contact["solref"], GRAVITY_M_S2)))
 
         def throw(data: mujoco.MjData) -> None:
             data.qvel[:2] = self.speed_m_s * self.direction
@@ -205,7 +203,7 @@ def slip_speed(path: Path) -> Float64:
     spin = np.array(
         [_to_world(q, w) for q, w in zip(path.qpos[:, 3:7], path.qvel[:, 3:6], strict=True)]
     )
-    contact = np.array([0.0, 0.0, -BALL_RADIUS_M])
+    contact = np.array([0.0, 0.0, -RADIUS_M])
     speed: Float64 = np.linalg.norm((path.qvel[:, :3] + np.cross(spin, contact))[:, :2], axis=1)
     return speed
 

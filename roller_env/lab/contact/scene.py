@@ -12,19 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.lab.contact.trial import MujocoTrial
-from roller_env.lab.experiment import Measure
+from roller_env.lab.game import FRICTION, MASS_KG, RADIUS_M
 from roller_env.lab.methods import Method, MujocoMethod
+from roller_env.lab.scene import Measure
 from roller_env.physics.materials import IMPEDANCE, contact_parameters
 from roller_env.physics.presets import PRESETS, PhysicsPreset
-from roller_env.units import quants
 
 Float64 = npt.NDArray[np.float64]
-
-BALL_RADIUS_M: Final = quants(16.0)
-BALL_MASS_KG: Final = 1.0
-GRAVITY_M_S2: Final = quants(386.0)
-FRICTION: Final = 0.3
-"""The game's ball, gravity and friction: docs of the original, in `roller_env.level.schema`."""
 
 SOFT_TIME_CONSTANT_S: Final = 0.04
 """Of the soft contact: 2 h for the largest step h = 0.02 s with which it is used, what MuJoCo's
@@ -37,7 +31,7 @@ its own, and their creep would hide what integrators do."""
 
 @dataclass(frozen=True)
 class ContactScene(ABC):
-    """A scene that MuJoCo simulates; see `roller_env.lab.experiment.Scene`.
+    """A scene that MuJoCo simulates; see `roller_env.lab.scene.Scene`.
 
     Contact parameters never follow the time step where an error is called discretisation: at every
     step, and for the reference, it is the same soft contact.
@@ -137,7 +131,7 @@ def add_ball(spec: mujoco.MjSpec, position: Sequence[float], name: str = "ball")
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        size=[BALL_RADIUS_M, 0.0, 0.0],
-        mass=BALL_MASS_KG,
+        size=[RADIUS_M, 0.0, 0.0],
+        mass=MASS_KG,
         condim=3,
     )

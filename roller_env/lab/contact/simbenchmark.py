@@ -30,82 +30,31 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from pathlib import Path
+from typing import Any, Final
 
 import mujoco
 import numpy as np
+from pandas import read_csv
 from scipy.spatial.distance import pdist
 
+from roller_env.lab import simulate
 from roller_env.lab.contact.scene import ContactScene, Float64, game_contact
-from roller_env.lab.contact.trial import Held, MujocoTrial, Path, steps_of
-from roller_env.lab.experiment import Measure
+from roller_env.lab.contact.trial import Held, MujocoTrial, steps_of
 from roller_env.lab.methods import MUJOCO, PYRAMIDAL, MujocoMethod
+from roller_env.lab.scene import Measure
 from roller_env.physics.presets import PhysicsPreset
 
 GRAVITY_M_S2: Final = 9.81
 """SimBenchmark's, unlike the game's."""
 
-Test = Literal["rolling-y", "rolling-xy", "bouncing", "666", "666-dropped"]
+PUBLISHED: Final = read_csv(Path(__file__).with_suffix(".csv"))
+"""SimBenchmark's data without error reduction: ``test`` (the scene here that it belongs beside),
+``engine`` (with solver and integrator where there was a choice), ``dt_s``, ``error`` (its measure;
+infinite where the simulation blew up) and ``wall_s`` (CPU seconds of its machine of 2018).
 
-
-@dataclass(frozen=True, slots=True)
-class Published:
-    """One row of SimBenchmark's data, without error reduction.
-
-    Attributes:
-        test: the scene here that it belongs beside.
-        engine: with solver and integrator where there was a choice.
-        dt_s: time step.
-        error: its measure of error; infinite where the simulation blew up.
-        wall_s: CPU seconds for the whole test, on its machine of 2018.
-    """
-
-    test: Test
-    engine: str
-    dt_s: float
-    error: float
-    wall_s: float
-
-
-PUBLISHED: Final = (
-    Published("rolling-xy", "RaiSim", 1e-3, 4.13711e-7, 0.308104),
-    Published("rolling-xy", "Bullet", 1e-3, 5.70654e-9, 0.561834),
-    Published("rolling-xy", "ODE quick", 1e-3, 3.14497, 0.724026),
-    Published("rolling-xy", "DART Dantzig", 1e-3, 3.14497, 2.67552),
-    Published("rolling-xy", "MuJoCo 1.50 CG Euler", 1e-3, 8.14432e-3, 1.32841),
-    Published("rolling-xy", "MuJoCo 1.50 CG RK4", 1e-3, 2.44841e-3, 4.0083),
-    Published("rolling-xy", "MuJoCo 1.50 Newton Euler", 1e-3, 6.92691e-3, 1.67194),
-    Published("rolling-xy", "MuJoCo 1.50 Newton RK4", 1e-3, 2.7148e-3, 4.40043),
-    Published("rolling-y", "RaiSim", 1e-3, 4.1268e-7, 0.322526),
-    Published("rolling-y", "Bullet", 1e-3, 4.93482e-9, 0.547962),
-    Published("rolling-y", "ODE quick", 1e-3, 7.66873e-9, 0.719417),
-    Published("rolling-y", "DART Dantzig", 1e-3, 0.42589, 2.74954),
-    Published("rolling-y", "MuJoCo 1.50 CG Euler", 1e-3, 8.38886e-3, 0.885674),
-    Published("rolling-y", "MuJoCo 1.50 CG RK4", 1e-3, 2.36152e-3, 3.14849),
-    Published("rolling-y", "MuJoCo 1.50 Newton Euler", 1e-3, 9.2196e-3, 1.39105),
-    Published("rolling-y", "MuJoCo 1.50 Newton RK4", 1e-3, 3.17043e-3, 3.48782),
-    Published("bouncing", "RaiSim", 1e-3, 0.0186204, 0.235136),
-    Published("bouncing", "Bullet", 1e-3, 75245.4, 0.851648),
-    Published("bouncing", "ODE quick", 1e-3, 185.027, 1.88695),
-    Published("bouncing", "DART Dantzig", 1e-3, 72274.4, 3.2084),
-    Published("bouncing", "RaiSim", 1e-2, 185.953, 0.0252509),
-    Published("bouncing", "Bullet", 1e-2, 7.40664e6, 0.102335),
-    Published("bouncing", "ODE quick", 1e-2, 18808.3, 0.189298),
-    Published("bouncing", "DART Dantzig", 1e-2, 7.37588e6, 0.338765),
-    Published("666", "RaiSim", 1e-2, 0.0152745, 0.167983),
-    Published("666", "Bullet", 1e-2, 37.4217, 2.01153),
-    Published("666", "ODE quick", 1e-2, 0.0161901, 1.00332),
-    Published("666", "DART Dantzig", 1e-2, 214.842, 3.06581),
-    Published("666", "RaiSim", 1e-1, 0.961629, 0.0367491),
-    Published("666", "Bullet", 1e-1, 278496.0, 0.91797),
-    Published("666", "ODE quick", 1e-1, 3.05789, 0.121567),
-    Published("666", "DART Dantzig", 1e-1, 6.83924, 2.75566),
-    Published("666-dropped", "MuJoCo 1.50 CG Euler", 1e-2, 0.933764, 1.79375),
-    Published("666-dropped", "MuJoCo 1.50 CG RK4", 1e-2, 0.933079, 5.59266),
-    Published("666-dropped", "MuJoCo 1.50 CG Euler", 1e-1, 10.9946, 0.403662),
-    Published("666-dropped", "MuJoCo 1.50 CG RK4", 1e-1, 11.7761, 1.33622),
-)
-"""From ``data/rolling/default.csv``, ``data/bouncing/sample.csv``, ``data/666/sample.csv``."""
+From ``data/rolling/default.csv``, ``data/bouncing/sample.csv``, ``data/666/sample.csv``.
+"""
 
 
 def benchmark_spec(method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
@@ -188,7 +137,7 @@ class Rolling(ContactScene):
         def push(data: mujoco.MjData) -> None:
             data.xfrc_applied[1, :2] = self.force_n * np.array(self.direction)
 
-        def judge(path: Path) -> Mapping[str, float]:
+        def judge(path: simulate.Path) -> Mapping[str, float]:
             return {"velocity": self.error(path.time, path.qvel[:, :3], path.qvel[:, 6:9])}
 
         total, part = steps_of(self.horizon_s, dt_s), steps_of(0.2, dt_s)
@@ -244,7 +193,7 @@ class Bouncing(ContactScene):
                 at = (2.0 * x, 2.0 * y, self.height_m)
                 add_sphere(spec, at, self.radius_m, self.ball_kg, condim=1, **contact)
 
-        def judge(path: Path) -> Mapping[str, float]:
+        def judge(path: simulate.Path) -> Mapping[str, float]:
             return {"energy": self.error(path.qpos[:, 2::7], path.qvel.reshape(-1, 49, 6))}
 
         total, part = steps_of(self.horizon_s, dt_s), steps_of(2.0, dt_s)
@@ -308,7 +257,7 @@ class SixSixSix(ContactScene):
             add_sphere(spec, at.tolist(), self.radius_m, self.ball_kg, **contact)
         total = steps_of(self.horizon_s, dt_s)
 
-        def judge(path: Path) -> Mapping[str, float]:
+        def judge(path: simulate.Path) -> Mapping[str, float]:
             places = path.qpos.reshape(total + 1, -1, 7)[:-1, :, :3]
             squares = np.array([squared_penetration(one, self.radius_m) for one in places])
             mean = float(squares.mean())

@@ -8,31 +8,9 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from roller_env.lab.methods import without_warnings
-
-Float64 = npt.NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Path:
-    """What a simulation did, sampled before the first step and after every step.
-
-    Attributes:
-        time: (S + 1,) seconds.
-        qpos: (S + 1, nq) MuJoCo's positions.
-        qvel: (S + 1, nv) MuJoCo's velocities.
-    """
-
-    time: Float64
-    qpos: Float64
-    qvel: Float64
-
-    @property
-    def finite(self) -> bool:
-        """Whether every number of it is."""
-        return bool(np.isfinite(self.qpos).all() and np.isfinite(self.qvel).all())
+from roller_env.lab.simulate import Float64, Path, record
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,20 +77,18 @@ class MujocoTrial:
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
         self._start(data)
-        steps = sum(held.steps for held in self._plan)
-        qpos = np.empty((steps + 1, model.nq))
-        qvel = np.empty((steps + 1, model.nv))
-        qpos[0], qvel[0] = data.qpos, data.qvel
-        index, part_begins = 0, self._part.indices(len(self._plan))[0]
-        for number, held in enumerate(self._plan):
-            if number == part_begins:
-                mujoco.mj_getState(model, data, self._before_part, _STATE)
-            data.ctrl[:] = held.ctrl
-            for _ in range(held.steps):
-                mujoco.mj_step(model, data)
-                index += 1
-                qpos[index], qvel[index] = data.qpos, data.qvel
-        self._path = Path(np.arange(steps + 1) * model.opt.timestep, qpos, qvel)
+        # The number of the step before which each piece of the plan begins.
+        begins = np.cumsum([0, *(held.steps for held in self._plan)]).tolist()
+        part_begins = self._part.indices(len(self._plan))[0]
+
+        def control(step: int) -> None:
+            for number, held in enumerate(self._plan):
+                if begins[number] == step:
+                    if number == part_begins:
+                        mujoco.mj_getState(model, data, self._before_part, _STATE)
+                    data.ctrl[:] = held.ctrl
+
+        self._path = record(model, data, begins[-1], before=control)
 
     def run_part(self) -> None:
         """Simulate the part that is timed."""

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
-import mujoco
 import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
@@ -16,24 +15,31 @@ from mujoco.batch import Batch
 from roller_env.compile.compiled import CompiledLevel
 from roller_env.config import EnvConfig
 from roller_env.game.actions import forces, held_keys
+from roller_env.lab.game import (
+    DECK_M,
+    FRICTION,
+    GATE_SPEED_M_S,
+    GRAVITY_M_S2,
+    LIFT_N,
+    LIFT_S,
+    RADIUS_M,
+    THROUGH_M,
+    TUBE_FALL_M,
+    Course,
+    make_level,
+    play,
+    played,
+)
 from roller_env.lab.presets.setting import Setting
-from roller_env.lab.stability.failures import GATE_SPEED_M_S, hanging_gate_level, seam_level
-from roller_env.lab.stability.game import Course, make_level, play
+from roller_env.lab.stability.failures import hanging_gate_level, seam_level
 from roller_env.level import Level, load_level
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.physics.stepper import keeps_poses
-from roller_env.simulation import Simulation
 from roller_env.units import quants
 
 Float64 = npt.NDArray[np.float64]
 
-RADIUS_M: Final = quants(16.0)
 LANE_M: Final = 80.0
-GRAVITY_M_S2: Final = quants(386.0)
-FRICTION: Final = 0.3
-DECK_M: Final = quants(16.0)
-LIFT_N: Final = quants(500.0)
-LIFT_S: Final = 5.0
 LOST_M: Final = 1e4
 ROLLING: Final = 1.4
 """Inertia of a solid ball that rolls, over its mass."""
@@ -136,16 +142,12 @@ def driving(setting: Setting) -> dict[str, float]:
 
 # Landing -------------------------------------------------------------------------------------
 
-FALL_M: Final = 46.9
-"""The highest that a pad throws the ball over a deck."""
 FALL_S: Final = 4.0
 FASTEST_M_S: Final = 36.0
 """Of a ball that enters classic's tube as fast as it can, climbs its wall and flies 66 m up."""
 ARRIVALS: Final = np.linspace(0.02, 0.98, 12)
 """Shares of a step after which a ball touches the ground."""
 TUNNEL_SPEEDS_M_S: Final = np.arange(10.0, 121.0, 5.0)
-THROUGH_M: Final = RADIUS_M + DECK_M / 2
-"""Deeper, the ball's centre is past the middle of the deck and it is pushed out below."""
 
 
 def landing(setting: Setting) -> dict[str, float]:
@@ -155,7 +157,7 @@ def landing(setting: Setting) -> dict[str, float]:
     falling = World(setting, level, len(ARRIVALS), FALL_S)
     falling.position[:, :2] = 0.0
     # 0.5 m of height are one step of 1/60 s at 30 m/s.
-    falling.position[:, 2] = RADIUS_M + FALL_M + 0.5 * ARRIVALS
+    falling.position[:, 2] = RADIUS_M + TUBE_FALL_M + 0.5 * ARRIVALS
     fallen = _depth(falling.path())
     speeds = np.array([FASTEST_M_S, *TUNNEL_SPEEDS_M_S])
     speed, arrival = (a.ravel() for a in np.meshgrid(speeds, ARRIVALS, indexing="ij"))
@@ -362,40 +364,11 @@ REFERENCE_HZ: Final = 7680
 both 4e-4 of the way from it. Contacts go with the step and approach a rigid ball's."""
 
 
-@dataclass(frozen=True, slots=True)
-class Recording:
-    """A game that was played once with the rules, to be repeated without them.
-
-    Attributes:
-        start: (3,) of the ball, m.
-        ctrl: (steps, nu) what the actuators did, held for `CONTROL_DT_S` each.
-    """
-
-    start: Float64
-    ctrl: Float64
-
-
 @cache
-def recordings() -> tuple[Recording, ...]:
-    """Play `COURSES` on the classic level with the product's own rules and ``accurate`` physics."""
+def recordings() -> tuple[tuple[Float64, Float64], ...]:
+    """Play `COURSES` on the classic level with ``accurate`` physics; see `played`."""
     config = EnvConfig(level="classic", physics="accurate", control_dt_s=CONTROL_DT_S)
-    return tuple(_record(config, keys, seed) for seed, keys in enumerate(COURSES))
-
-
-def _record(config: EnvConfig, keys: Sequence[tuple[str, float]], seed: int) -> Recording:
-    simulation = Simulation(config)
-    simulation.seed([np.random.default_rng(seed)])
-    simulation.reset()
-    model = simulation.compiled.model
-    data = mujoco.MjData(model)
-    start, ctrl = simulation.ball_position[0], []
-    for held, seconds in keys:
-        for _ in range(round(seconds / CONTROL_DT_S)):
-            simulation.step(forces("keys", held_keys(held)[None]))
-            state: Float64 = simulation.snapshot().physics[0]
-            mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
-            ctrl.append(data.ctrl.copy())
-    return Recording(start, np.array(ctrl))
+    return tuple(played(config, keys, seed) for seed, keys in enumerate(COURSES))
 
 
 def course(setting: Setting, reference_hz: int = REFERENCE_HZ) -> dict[str, float]:
@@ -413,12 +386,12 @@ def course(setting: Setting, reference_hz: int = REFERENCE_HZ) -> dict[str, floa
 
 def course_paths(setting: Setting) -> Float64:
     """Return where the ball is after every control step, (courses, steps + 1, 3) m."""
-    played = recordings()
-    world = World(setting, load_level("classic"), len(played), CONTROL_DT_S)
-    world.position[:] = [one.start for one in played]
+    starts, controls = zip(*recordings(), strict=True)
+    world = World(setting, load_level("classic"), len(starts), CONTROL_DT_S)
+    world.position[:] = starts
     places = [world.position.copy()]
-    for step in range(len(played[0].ctrl)):
-        world.ctrl[:] = [one.ctrl[step] for one in played]
+    for ctrl in zip(*controls, strict=True):
+        world.ctrl[:] = ctrl
         places.append(world.path()[:, -1])
     return np.stack(places, axis=1)
 
@@ -434,54 +407,32 @@ def _worst(values: Float64) -> float:
     return float(values.max()) if np.isfinite(values).all() else math.inf
 
 
-@dataclass(frozen=True, slots=True)
-class Errors:
-    """What one setting gets wrong.
+Errors = dict[str, float]
+"""What one setting gets wrong, by the names of `MEANINGS`."""
 
-    Attributes:
-        path: distance from a rigid ball's place after 5 s of driving over the way rolled; worst of
-            twelve sequences of keys.
-        heading_deg: largest error of the direction in which keys push, of all eight.
-        landing_share: depth of the landing after 46.9 m over that at which a ball falls through.
-        fastest_share: the same for 36 m/s.
-        tunnels_at_m_s: least speed tried at which a ball passes a deck of 16 quants; or infinite.
-        elasticity: largest error of the coefficient of restitution, of five and at seven speeds.
-        friction: largest error of the coefficient of friction, measured on skids.
-        skid_speed: largest relative error of the speed at which a skid ends.
-        skid_heading_deg: largest bend of a skid's way.
-        hop_mm: highest that a ball skidding at 4 m/s hops.
-        rest_mm: how deep a ball lies in the ground half a second after it was put there.
-        lift: relative error of the height to which a lift pad throws.
-        seam_mm: highest bump at a seam of classic's bridge, at 3 to 15 m/s.
-        movers: largest relative error of the speed of a plate or gate under the ball.
-        ringing: how much that speed goes up and down once it is reached, over the speed.
-        carried_mm: how deep the ball is in what sinks under it.
-        squeeze_mm: deepest contact while a hanging gate presses on the ball.
-        lane_mm: highest bump on a lane of 49 seams that cannot be merged, at 7.5 to 15 m/s.
-        lane_share: of these speeds, the share at which that bump is over one quant.
-        course: distance from the converged model's place on the classic course over the way.
-    """
-
-    path: float
-    heading_deg: float
-    landing_share: float
-    fastest_share: float
-    tunnels_at_m_s: float
-    elasticity: float
-    friction: float
-    skid_speed: float
-    skid_heading_deg: float
-    hop_mm: float
-    rest_mm: float
-    lift: float
-    seam_mm: float
-    movers: float
-    ringing: float
-    carried_mm: float
-    squeeze_mm: float
-    lane_mm: float
-    lane_share: float
-    course: float
+MEANINGS: Final = {
+    "path": "distance from a rigid ball's place after 5 s of driving over the way rolled; worst of "
+    "twelve sequences of keys",
+    "heading_deg": "largest error of the direction in which keys push, of all eight",
+    "landing_share": "depth of the landing after 46.9 m over that at which a ball falls through",
+    "fastest_share": "the same for 36 m/s",
+    "tunnels_at_m_s": "least speed tried at which a ball passes a deck of 16 quants; or infinite",
+    "elasticity": "largest error of the coefficient of restitution, of five and at seven speeds",
+    "friction": "largest error of the coefficient of friction, measured on skids",
+    "skid_speed": "largest relative error of the speed at which a skid ends",
+    "skid_heading_deg": "largest bend of a skid's way",
+    "hop_mm": "highest that a ball skidding at 4 m/s hops",
+    "rest_mm": "how deep a ball lies in the ground half a second after it was put there",
+    "lift": "relative error of the height to which a lift pad throws",
+    "seam_mm": "highest bump at a seam of classic's bridge, at 3 to 15 m/s",
+    "movers": "largest relative error of the speed of a plate or gate under the ball",
+    "ringing": "how much that speed goes up and down once it is reached, over the speed",
+    "carried_mm": "how deep the ball is in what sinks under it",
+    "squeeze_mm": "deepest contact while a hanging gate presses on the ball",
+    "lane_mm": "highest bump on a lane of 49 seams that cannot be merged, at 7.5 to 15 m/s",
+    "lane_share": "of these speeds, the share at which that bump is over one quant",
+    "course": "distance from the converged model's place on the classic course over the way",
+}
 
 
 _MEASURES: Final[Sequence[Callable[[Setting], dict[str, float]]]] = (
@@ -502,15 +453,15 @@ def errors_of(setting: Setting, reference_hz: int = REFERENCE_HZ) -> Errors:
     values = course(setting, reference_hz)
     for measure in _MEASURES:
         values |= measure(setting)
-    return Errors(**values)
+    return values
 
 
 @dataclass(frozen=True, slots=True)
-class Criterion:
+class Requirement:
     """What the game can bear.
 
     Attributes:
-        name: of the field of `Errors`.
+        name: in `MEANINGS`.
         label: for tables and charts; after a comma the unit.
         limit: largest bearable value.
         reason: why that.
@@ -533,29 +484,32 @@ class Criterion:
 
 
 _ASKED: Final = "asked of the default preset"
+_FALLS: Final = "deeper, it falls through"
 _NOT_SEEN: Final = "a fiftieth of the radius is not seen"
-CRITERIA: Final = (
-    Criterion("path", "path after 5 s of driving", 0.01, _ASKED),
-    Criterion("heading_deg", "heading of the keys, °", 0.5, _ASKED),
-    Criterion("landing_share", "landing from 46.9 m", 1.0, "deeper, it falls through"),
-    Criterion("fastest_share", "landing at 36 m/s", 1.0, "deeper, it falls through"),
-    Criterion("elasticity", "elasticity", 0.02, _ASKED),
-    Criterion("friction", "friction", 0.02, _ASKED),
-    Criterion("skid_speed", "speed after a skid", 0.01, "as for the path"),
-    Criterion("skid_heading_deg", "bend of a skid, °", 0.5, "as for the keys"),
-    Criterion("rest_mm", "depth at rest, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
-    Criterion("lift", "height of the lift", 0.01, "as for the path"),
-    Criterion("seam_mm", "bump of a seam, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
-    Criterion("movers", "speed of plate and gate", 0.01, "as for the path"),
-    Criterion("ringing", "ringing of plate and gate", 0.01, "as for the path"),
-    Criterion("carried_mm", "depth on plate and gate, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
-    Criterion("squeeze_mm", "depth under a gate, mm", 1e3 * THROUGH_M, "deeper, it falls through"),
-    Criterion("lane_share", "thrown by a lane of seams", 0.1, "one speed in ten"),
-    Criterion("course", "course of classic", 0.01, "as for the path"),
+REQUIREMENTS: Final = (
+    Requirement("path", "path after 5 s of driving", 0.01, _ASKED),
+    Requirement("heading_deg", "heading of the keys, °", 0.5, _ASKED),
+    Requirement("landing_share", "landing from 46.9 m", 1.0, _FALLS),
+    Requirement("fastest_share", "landing at 36 m/s", 1.0, _FALLS),
+    Requirement("elasticity", "elasticity", 0.02, _ASKED),
+    Requirement("friction", "friction", 0.02, _ASKED),
+    Requirement("skid_speed", "speed after a skid", 0.01, "as for the path"),
+    Requirement("skid_heading_deg", "bend of a skid, °", 0.5, "as for the keys"),
+    Requirement("rest_mm", "depth at rest, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
+    Requirement("lift", "height of the lift", 0.01, "as for the path"),
+    Requirement("seam_mm", "bump of a seam, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
+    Requirement("movers", "speed of plate and gate", 0.01, "as for the path"),
+    Requirement("ringing", "ringing of plate and gate", 0.01, "as for the path"),
+    Requirement("carried_mm", "depth on plate and gate, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
+    Requirement(
+        "squeeze_mm", "depth under a gate, mm", 1e3 * THROUGH_M, "deeper, it falls through"
+    ),
+    Requirement("lane_share", "thrown by a lane of seams", 0.1, "one speed in ten"),
+    Requirement("course", "course of classic", 0.01, "as for the path"),
 )
 """The hop of a skid has no limit here, since what cures it costs the course; see the docs."""
 
 
-def broken(errors: Errors) -> list[Criterion]:
-    """Return the criteria that are not met."""
-    return [one for one in CRITERIA if not getattr(errors, one.name) <= one.limit]
+def violations(errors: Errors) -> list[Requirement]:
+    """Return the requirements that are not met."""
+    return [one for one in REQUIREMENTS if not errors[one.name] <= one.limit]

@@ -2,66 +2,65 @@
 
 from __future__ import annotations
 
+import math
 import shutil
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from roller_env.lab.presets import charts
-from roller_env.lab.presets.economies import AS_CHOSEN, EconomyRow
-from roller_env.lab.presets.errors import CRITERIA
-from roller_env.lab.presets.results import SettingRow
-from roller_env.lab.provenance import header
-from roller_env.lab.style import save
-from roller_env.lab.tables import markdown, write_rows
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+
+from roller_env.lab import chart, table
+from roller_env.lab.presets.ablations import AS_CHOSEN
+from roller_env.lab.presets.errors import REQUIREMENTS, Requirement
+from roller_env.lab.runner import header
+from roller_env.lab.table import Frame, markdown
 from roller_env.physics.presets import PRESETS
 
-_TITLES: Final = (
-    "setting",
-    "µs a step",
-    "CPU ms per s",
-    "course %",
-    "path %",
-    "landing",
-    "elasticity",
-    "friction",
-    "seam mm",
-    "hop mm",
-    "rest mm",
-    "lane mm",
-    "lane %",
-    "squeeze mm",
-    "breaks",
-)
-
+_COLUMNS: Final[Mapping[str, tuple[str, float]]] = {
+    "µs a step": ("us_per_step", 1.0),
+    "CPU ms per s": ("cpu_s_per_s", 1e3),
+    "course %": ("course", 100.0),
+    "path %": ("path", 100.0),
+    "landing": ("landing_share", 1.0),
+    "elasticity": ("elasticity", 1.0),
+    "friction": ("friction", 1.0),
+    "seam mm": ("seam_mm", 1.0),
+    "hop mm": ("hop_mm", 1.0),
+    "rest mm": ("rest_mm", 1.0),
+    "lane mm": ("lane_mm", 1.0),
+    "lane %": ("lane_share", 100.0),
+    "squeeze mm": ("squeeze_mm", 1.0),
+}
+"""Of the table: a title, the column, and by what it is multiplied."""
 
 _BEGIN: Final = "<!-- measured: python scripts/presets.py --docs docs -->"
 _END: Final = "<!-- end of what was measured -->"
 _PUBLISHED: Final[Mapping[str, str]] = {
     "front": "presets.png",
-    "promises": "presets-promises.png",
-    "economies": "presets-economies.png",
+    "requirements": "presets-requirements.png",
+    "ablations": "presets-ablations.png",
 }
 """The pictures by their name in a run and in the documentation."""
 
 
-def write(
-    rows: Sequence[SettingRow],
-    economies: Sequence[EconomyRow],
-    facts: dict[str, str],
-    out: Path,
-) -> list[Path]:
+def write(settings: Frame, ablations: Frame, facts: dict[str, str], out: Path) -> list[Path]:
     """Write everything; return the files."""
-    files = [*write_rows(rows, facts, out / "settings")]
-    files += write_rows(economies, facts, out / "economies")
+    files = [*table.write(settings, facts, out / "settings")]
+    files += table.write(ablations, facts, out / "ablations")
     for name, figure in (
-        ("front", charts.draw_front(rows)),
-        ("promises", charts.draw_promises(rows)),
-        ("economies", charts.draw_economies(economies)),
+        ("front", draw_front(settings)),
+        ("requirements", draw_requirements(settings)),
+        ("ablations", draw_ablations(ablations)),
     ):
-        files += save(figure, facts, out / name)
+        files += chart.save(figure, facts, out / name)
     page = out / "presets.md"
-    page.write_text(f"{header(facts)}\n\n{tables(rows, economies)}", encoding="utf-8")
+    page.write_text(f"{header(facts)}\n\n{tables(settings, ablations)}", encoding="utf-8")
     return [*files, page]
 
 
@@ -85,70 +84,216 @@ def publish(out: Path, docs: Path) -> list[Path]:
     return [page, *pictures]
 
 
-def tables(rows: Sequence[SettingRow], economies: Sequence[EconomyRow]) -> str:
+def tables(settings: Frame, ablations: Frame) -> str:
     """Return the tables in Markdown, presets first and all settings folded away."""
-    presets = [row for row in rows if row.setting in PRESETS]
+    classic, sizes = ablations[ablations.boxes == 0], ablations[ablations.boxes > 0]
     parts = [
-        markdown(_TITLES, [_cells(row) for row in presets]),
-        f"<details><summary>All {len(rows)} settings, the cheapest first</summary>\n",
-        markdown(_TITLES, [_cells(row) for row in rows]),
+        _settings_table(settings[settings.setting.isin(list(PRESETS))]),
+        f"<details><summary>All {len(settings)} settings, the cheapest first</summary>\n",
+        _settings_table(settings),
         "</details>\n",
         markdown(
             ("classic level", "geoms", "µs a step", "same to the bit"),
             [
                 (row.what, row.geoms, row.us_per_step, "yes" if row.same_bits else "no")
-                for row in economies
-                if not row.boxes
+                for row in classic.itertuples()
             ],
         ),
         markdown(
             ("boxes", "modelled", "µs a step", "same to the bit"),
             [
                 (row.boxes, row.what, row.us_per_step, "yes" if row.same_bits else "no")
-                for row in economies
-                if row.boxes
+                for row in sizes.itertuples()
             ],
         ),
         markdown(
-            ("promise", "at most", "why"), [(one.label, one.limit, one.reason) for one in CRITERIA]
+            ("requirement", "at most", "why"),
+            [(one.label, one.limit, one.reason) for one in REQUIREMENTS],
         ),
     ]
     return "\n".join(parts)
 
 
-def summary(rows: Sequence[SettingRow], economies: Sequence[EconomyRow]) -> list[str]:
+def _settings_table(settings: Frame) -> str:
+    cells = [
+        [
+            f"**{row['setting']}**" if row["front"] else row["setting"],
+            *(factor * row[column] for column, factor in _COLUMNS.values()),
+            row["violations"] or "-",
+        ]
+        for row in settings.to_dict("records")
+    ]
+    return markdown(("setting", *_COLUMNS, "violations"), cells)
+
+
+def summary(settings: Frame, ablations: Frame) -> list[str]:
     """Return what a run found, a line each."""
     lines = []
-    for row in rows:
-        if row.setting in PRESETS:
-            state = f"breaks {row.breaks}" if row.breaks else "keeps every promise"
-            place = "on the front" if row.front else "not on the front"
-            lines.append(
-                f"{row.setting}: {100 * row.course:.2f} % of the way on the course, "
-                f"{1e3 * row.cpu_s_per_s:.2f} CPU ms a second, {state}, {place}"
-            )
-    lines.append("front: " + ", ".join(row.setting for row in rows if row.front))
-    grown = [row for row in economies if row.boxes and row.what == AS_CHOSEN]
-    ratio = grown[-1].us_per_step / grown[0].us_per_step
-    lines.append(f"a step on {grown[-1].boxes} boxes costs {ratio:.2f} of one on {grown[0].boxes}")
+    for row in settings[settings.setting.isin(list(PRESETS))].itertuples():
+        state = f"violates {row.violations}" if row.violations else "meets every requirement"
+        place = "on the front" if row.front else "not on the front"
+        lines.append(
+            f"{row.setting}: {100 * row.course:.2f} % of the way on the course, "
+            f"{1e3 * row.cpu_s_per_s:.2f} CPU ms a second, {state}, {place}"
+        )
+    lines.append("front: " + ", ".join(settings[settings.front].setting))
+    grown = ablations[(ablations.boxes > 0) & ablations.chosen]
+    few, many = grown.iloc[0], grown.iloc[-1]
+    ratio = many.us_per_step / few.us_per_step
+    lines.append(f"a step on {many.boxes} boxes costs {ratio:.2f} of one on {few.boxes}")
     return lines
 
 
-def _cells(row: SettingRow) -> tuple[object, ...]:
-    return (
-        f"**{row.setting}**" if row.front else row.setting,
-        row.us_per_step,
-        1e3 * row.cpu_s_per_s,
-        100.0 * row.course,
-        100.0 * row.path,
-        row.landing_share,
-        row.elasticity,
-        row.friction,
-        row.seam_mm,
-        row.hop_mm,
-        row.rest_mm,
-        row.lane_mm,
-        100.0 * row.lane_share,
-        row.squeeze_mm,
-        row.breaks or "-",
+# --- pictures --------------------------------------------------------------------------------
+
+_KNOBS: Final = {
+    "presets": "#111111",
+    "time step": "#2f6db3",
+    "RK4": "#d1495b",
+    "integrator": "#7a5bb5",
+    "cone": "#b58900",
+    "contacts": "#1b998b",
+    "solver": "#ef8e19",
+    "flags": "#7d8597",
+    "combinations": "#c77dba",
+}
+_SHOWN_PERCENT: Final = (0.03, 1.6)
+"""Errors beyond these are drawn at them, with their figure."""
+
+
+def draw_front(settings: Frame) -> Figure:
+    """Draw every setting's error on the classic course against its cost."""
+    figure, ((axes,),) = chart.grid(
+        (1, 1),
+        "Physics presets: what is the cheapest setting that tells the truth?",
+        "Error: eight games of 3 s on the classic level, under recorded keys. A cross violates "
+        "another of the game's requirements; the front is of those that meet all. Of settings that "
+        "change nothing but the cost only those on the front have a name.",
+        panel=(10.6, 5.6),
     )
+    rows = list(settings.itertuples())
+    with matplotlib.rc_context(chart.STYLE):
+        axes.plot(*zip(*sorted(_place(row) for row in rows if row.front), strict=True), lw=9,
+                  color=chart.PARETO, zorder=1, label="Pareto front")  # fmt: skip
+        for row in rows:
+            mark: dict[str, Any] = {"marker": "o", "ms": 13 if row.setting in PRESETS else 7.5}
+            if row.violations and row.setting not in PRESETS:
+                mark = {"marker": "x", "ms": 7, "mew": 1.6}
+            axes.plot(*_place(row), color=_KNOBS[row.knob], ls="", label=row.knob, **mark)
+        axes.set(xscale="log", yscale="log", ylim=(_SHOWN_PERCENT[0], 1.25 * _SHOWN_PERCENT[1]))
+        axes.axhline(1.0, color="#777777", ls="--", zorder=0, label="required: at most 1 %")
+        axes.set_xlabel("CPU milliseconds for a simulated second of one game (classic, 1 thread)")
+        axes.set_ylabel("distance from the converged ball over the way, %")
+        chart.plain(axes.xaxis)
+        chart.plain(axes.yaxis)
+        of_default = settings[settings.setting == "default"].course.tolist()
+        named = [row for row in rows if not _like(row, of_default)]
+        chart.label(axes, [(_name(row), *_place(row), _colour(row)) for row in named])
+        chart.legend_of(figure, axes, columns=11)
+    return figure
+
+
+def _place(row: Any) -> tuple[float, float]:
+    return 1e3 * row.cpu_s_per_s, float(np.clip(100.0 * row.course, *_SHOWN_PERCENT))
+
+
+def _name(row: Any) -> str:
+    if row.setting in PRESETS:
+        return f"{row.setting}: {100 * row.course:.2f} %, {1e3 * row.cpu_s_per_s:.2g} ms"
+    beyond = 100.0 * row.course > _SHOWN_PERCENT[1]
+    return f"{row.setting}: {100.0 * row.course:.0f} %" if beyond else str(row.setting)
+
+
+def _colour(row: Any) -> str:
+    if row.setting in PRESETS:
+        return "#111111"
+    return chart.FAILURE if row.violations else chart.QUIET
+
+
+def _like(row: Any, of_default: list[float]) -> bool:
+    """Say whether a setting changes nothing but the cost: such crowd round ``default``."""
+    alike = any(math.isclose(row.course, one, rel_tol=0.01) for one in of_default)
+    return alike and not (row.front or row.violations or row.setting in PRESETS)
+
+
+_COLOURS: Final = LinearSegmentedColormap.from_list(
+    "share of the limit", ["#d9efe9", "#f6f3d8", "#f2b25c", "#b00020"]
+)
+
+
+def draw_requirements(settings: Frame) -> Figure:
+    """Draw each setting's errors as shares of what the game can bear."""
+    first = settings.setting.isin(list(PRESETS))
+    order = settings.loc[[*settings.index[first], *settings.index[~first]]]
+    shares = np.stack([order[one.name] / one.limit for one in REQUIREMENTS], axis=1)
+    figure, ((axes,),) = chart.grid(
+        (1, 1),
+        "Errors as shares of what the game can bear",
+        "More than 1 is a violation. Presets, then all others, the cheapest first.",
+        panel=(11.4, 0.235 * len(order)),
+        margins=(1.9, 0.2, 1.9, 0.3),
+    )
+    with matplotlib.rc_context(chart.STYLE), np.errstate(divide="ignore"):
+        shown = np.log10(shares).clip(-3.0, 1.0)
+        axes.imshow(shown, cmap=_COLOURS, vmin=-3.0, vmax=1.0, aspect="auto")
+        for (y, x), share in np.ndenumerate(shares):
+            ink = "white" if share > 1.0 else "#333333"
+            axes.text(x, y, _written(share), ha="center", va="center", fontsize=7.5, color=ink)
+        axes.set_xticks(range(len(REQUIREMENTS)), map(_heading, REQUIREMENTS), fontsize=7.5)
+        axes.xaxis.tick_top()
+        axes.set_yticks(range(len(order)), order.setting, fontsize=8.5)
+        axes.axhline(first.sum() - 0.5, color="white", linewidth=5.0)
+        axes.grid(visible=False)
+        axes.tick_params(length=0)
+        axes.spines[:].set_visible(False)
+    return figure
+
+
+def _heading(requirement: Requirement) -> str:
+    unit = f" {requirement.unit}" if requirement.unit else ""
+    title = textwrap.wrap(requirement.title, 11)
+    return "\n".join([*title, f"≤ {requirement.limit:.3g}{unit}"])
+
+
+def _written(share: float) -> str:
+    if not np.isfinite(share) or share >= 100.0:
+        return ">99"
+    if math.isclose(share, 1.0, abs_tol=0.05):
+        return f"{share:.2f}" if f"{share:.2f}" != "1.00" else f"{share:.4g}"
+    return "0" if share < 5e-4 else f"{share:.1g}" if share < 0.1 else f"{share:.2g}"
+
+
+def draw_ablations(ablations: Frame) -> Figure:
+    """Draw what a step costs with more modelled than needed, and on larger levels."""
+    figure, ((ways, sizes),) = chart.grid(
+        (1, 2),
+        "Model no more than the scene needs: the cost of a physics step",
+        "Left: the classic level, modelled otherwise. Right: the same yard, with more boxes.",
+        panel=(4.4, 4.0),
+        margins=(2.9, 0.3, 0.9, 0.8),
+    )
+    with matplotlib.rc_context(chart.STYLE):
+        _draw_ways(ways, ablations[ablations.boxes == 0].sort_values("us_per_step"))
+        for what, own in ablations[ablations.boxes > 0].groupby("what", sort=False):
+            x, y = own.boxes.tolist(), own.us_per_step.tolist()
+            said = f"{what}: × {y[-1] / y[0]:.2f} from {x[0]} to {x[-1]}"
+            sizes.plot(x, y, "o-", lw=2.6 if what == AS_CHOSEN else 1.4, label=said)
+        sizes.legend(loc="upper left", fontsize=8)
+        sizes.set_ylim(0.0, 1.35 * ablations[ablations.boxes > 0].us_per_step.max())
+        sizes.set_xlabel("boxes of the level")
+    return figure
+
+
+def _draw_ways(axes: Axes, rows: Frame) -> None:
+    chosen = float(rows[rows.chosen].us_per_step.iloc[0])
+    colours = [chart.SERIES[1] if row.chosen else "#c3c9d1" for row in rows.itertuples()]
+    axes.barh(rows.what, rows.us_per_step, color=colours, height=0.7)
+    for place, row in enumerate(rows.itertuples()):
+        change = "" if row.chosen else f" ({100 * (row.us_per_step / chosen - 1):+.0f} %)"
+        axes.text(
+            row.us_per_step, place, f" {row.us_per_step:.1f}{change}", va="center", fontsize=8
+        )
+    axes.axvline(chosen, color=chart.SERIES[1], linewidth=1.0, linestyle=":")
+    axes.set_xlim(0.0, 1.3 * rows.us_per_step.max())
+    axes.grid(visible=False, axis="y")
+    axes.set_xlabel("CPU microseconds a step, classic level")

@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Any, Final
 
 from roller_env.lab.stability.bisection import Threshold
 
 EXACT: Final = (0.99, 1.01)
 """Band of measured / predicted where the formula is exact."""
-
-Verdict = Literal["holds", "differs"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,54 +89,25 @@ class Case:
     quick: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class LimitRow:
-    """One row of the results; the fields are `Case`'s."""
+def judged(case: Case, effort: Effort) -> dict[str, Any]:
+    """Measure a case and hold it against its prediction.
 
-    name: str
-    group: str
-    quantity: str
-    method: str
-    predicted: float
-    measured: float
-    ratio: float
-    band_low: float
-    band_high: float
-    verdict: Verdict
-    searched_to: float
-    tolerance: float
-    runs: int
-    formula: str
-    source: str
-    criterion: str
-    note: str
-
-
-def judged(case: Case, effort: Effort) -> LimitRow:
-    """Measure a case and hold it against its prediction."""
+    Returns:
+        A row of the table: the case's words, what was ``measured`` in how many ``runs``, its
+        ``ratio`` to what was ``predicted``, and the ``verdict``: holds or differs.
+    """
     found = case.measure(effort)
     low, high = case.band
-    if math.isinf(case.predicted):
-        ratio, holds = math.nan, math.isinf(found.value)
-    else:
-        ratio = found.value / case.predicted
-        holds = low <= ratio <= high
-    return LimitRow(
-        name=case.name,
-        group=case.group,
-        quantity=case.quantity,
-        method=case.method,
-        predicted=case.predicted,
-        measured=found.value,
-        ratio=ratio,
-        band_low=low,
-        band_high=high,
-        verdict="holds" if holds else "differs",
-        searched_to=case.searched_to,
-        tolerance=effort.tolerance,
-        runs=found.runs,
-        formula=case.formula,
-        source=case.source,
-        criterion=case.criterion,
-        note=case.note,
-    )
+    limited = math.isfinite(case.predicted)
+    ratio = found.value / case.predicted if limited else math.nan
+    holds = low <= ratio <= high if limited else math.isinf(found.value)
+    words = ("name", "group", "quantity", "method", "predicted", "formula", "source", "criterion")
+    return {name: getattr(case, name) for name in (*words, "searched_to", "note")} | {
+        "measured": found.value,
+        "ratio": ratio,
+        "band_low": low,
+        "band_high": high,
+        "verdict": "holds" if holds else "differs",
+        "tolerance": effort.tolerance,
+        "runs": found.runs,
+    }

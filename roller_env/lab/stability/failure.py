@@ -7,13 +7,12 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Final, Literal
+from typing import Any, Final
 
 import mujoco
-import numpy as np
-import numpy.typing as npt
 
-Float64 = npt.NDArray[np.float64]
+from roller_env.lab.runner import interleaved, timed
+from roller_env.lab.simulate import Float64, Path, record, settled, started
 
 TIMED_RUNS: Final = 10
 """Simulations that are timed together: a single one is too short for the clock."""
@@ -46,21 +45,6 @@ class Setting:
 
 
 @dataclass(frozen=True)
-class Record:
-    """A simulation, step by step.
-
-    Attributes:
-        time_s: (n,).
-        qpos: (n, nq).
-        qvel: (n, nv).
-    """
-
-    time_s: Float64
-    qpos: Float64
-    qvel: Float64
-
-
-@dataclass(frozen=True)
 class Failure:
     """A way to fail.
 
@@ -88,59 +72,19 @@ class Failure:
     y_label: str
     seconds: float
     settings: tuple[Setting, ...]
-    curve: Callable[[Record], tuple[Float64, Float64]]
+    curve: Callable[[Path], tuple[Float64, Float64]]
     quantity: str
-    value: Callable[[Record], float]
+    value: Callable[[Path], float]
     says: str
     acceptable: float
     limit_reason: str
     log_y: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class FailureRow:
-    """One setting of one failure.
-
-    Attributes:
-        failure: its name.
-        setting: what is different about it.
-        role: whether it is to fail or to cure.
-        quantity: what was measured, with its unit.
-        value: it.
-        acceptable: largest value that is no failure.
-        verdict: ``fails`` or ``holds``.
-        as_expected: whether the verdict is the role's.
-        time_ratio: time over that of the failing setting, medians of interleaved runs.
-        evaluations_ratio: evaluations of the forces over those of the failing setting.
-        why: the reason for the failure.
-        limit_reason: the reason for what is acceptable.
-    """
-
-    failure: str
-    setting: str
-    role: Literal["fails", "cures"]
-    quantity: str
-    value: float
-    acceptable: float
-    verdict: Literal["fails", "holds"]
-    as_expected: bool
-    time_ratio: float
-    evaluations_ratio: float
-    why: str
-    limit_reason: str
-
-
-def record(setting: Setting, seconds: float) -> Record:
+def simulated(setting: Setting, seconds: float) -> Path:
     """Simulate and keep every step."""
-    data = mujoco.MjData(setting.model)
-    setting.prepare(data)
-    steps = round(seconds / setting.dt_s)
-    qpos = np.empty((steps + 1, setting.model.nq))
-    qvel = np.empty((steps + 1, setting.model.nv))
-    for index in range(steps + 1):
-        qpos[index], qvel[index] = data.qpos, data.qvel
-        mujoco.mj_step(setting.model, data)
-    return Record(np.arange(steps + 1, dtype=np.float64) * setting.dt_s, qpos, qvel)
+    data = started(setting.model, setting.prepare)
+    return record(setting.model, data, round(seconds / setting.dt_s))
 
 
 def time_ratios(settings: Sequence[Setting], seconds: float, repeats: int) -> list[float]:
@@ -149,50 +93,48 @@ def time_ratios(settings: Sequence[Setting], seconds: float, repeats: int) -> li
     It is the time of this thread's own processor: MuJoCo uses one thread, so on a machine that is
     quiet that is the wall time, and on one that is not it is still the method's.
     """
-    runs = [partial(_step_all, setting, seconds) for setting in settings]
-    ratios: list[list[float]] = [[] for _ in runs]
-    for _ in range(repeats):
-        times = [_thread_time(run) for run in runs]
-        for own, taken in zip(ratios, times, strict=True):
-            own.append(taken / times[0])
-    return [statistics.median(own) for own in ratios]
+
+    def run(setting: Setting) -> None:
+        for _ in range(TIMED_RUNS):
+            settled(setting.model, seconds, setting.prepare)
+
+    turns = {one.label: partial(timed, partial(run, one), time.thread_time) for one in settings}
+    taken = interleaved(turns, repeats)
+    first = taken[settings[0].label]
+    return [
+        statistics.median(own / base for own, base in zip(taken[one.label], first, strict=True))
+        for one in settings
+    ]
 
 
-def _thread_time(run: Callable[[], None]) -> float:
-    start = time.thread_time()
-    for _ in range(TIMED_RUNS):
-        run()
-    return time.thread_time() - start
+def rows(failure: Failure, paths: Sequence[Path], repeats: int) -> list[dict[str, Any]]:
+    """Return a row for each setting.
 
-
-def _step_all(setting: Setting, seconds: float) -> None:
-    data = mujoco.MjData(setting.model)
-    setting.prepare(data)
-    mujoco.mj_step(setting.model, data, round(seconds / setting.dt_s))
-
-
-def rows(failure: Failure, records: Sequence[Record], repeats: int) -> list[FailureRow]:
-    """Return a row for each setting."""
+    Returns:
+        ``failure``, ``setting``, its ``role`` (fails or cures), the ``quantity``, its ``value`` and
+        what is ``acceptable``, the ``verdict`` (fails or holds) and whether it is ``as_expected``,
+        ``time_ratio`` and ``evaluations_ratio`` to the failing setting, ``why``, ``limit_reason``.
+    """
     ratios = time_ratios(failure.settings, failure.seconds, repeats)
     base = failure.settings[0].evaluations_per_s
     found = []
-    for index, (setting, kept) in enumerate(zip(failure.settings, records, strict=True)):
-        value = failure.value(kept)
+    for index, (setting, path) in enumerate(zip(failure.settings, paths, strict=True)):
+        value = failure.value(path)
         fails = not value <= failure.acceptable
         found.append(
-            FailureRow(
-                failure=failure.name,
-                setting=setting.label,
-                role="cures" if index else "fails",
-                quantity=failure.quantity,
-                value=value,
-                acceptable=failure.acceptable,
-                verdict="fails" if fails else "holds",
-                as_expected=fails == (index == 0),
-                time_ratio=ratios[index],
-                evaluations_ratio=setting.evaluations_per_s / base,
-                why=failure.why,
-                limit_reason=failure.limit_reason,
-            )
+            {
+                "failure": failure.name,
+                "setting": setting.label,
+                "role": "cures" if index else "fails",
+                "quantity": failure.quantity,
+                "value": value,
+                "acceptable": failure.acceptable,
+                "verdict": "fails" if fails else "holds",
+                "as_expected": fails == (index == 0),
+                "time_ratio": ratios[index],
+                "evaluations_ratio": setting.evaluations_per_s / base,
+                "why": failure.why,
+                "limit_reason": failure.limit_reason,
+            }
         )
     return found

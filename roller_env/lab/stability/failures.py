@@ -11,9 +11,10 @@ import numpy as np
 
 from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.compile.mjcf import SERVO_G, build_spec
+from roller_env.lab.game import GATE_SPEED_M_S, Course, make_level
 from roller_env.lab.methods import MujocoMethod
-from roller_env.lab.stability.failure import Failure, Float64, Record, Setting
-from roller_env.lab.stability.game import Course, make_level
+from roller_env.lab.simulate import Float64, Path
+from roller_env.lab.stability.failure import Failure, Setting
 from roller_env.lab.stability.scenes import (
     RADIUS_M,
     SETTLE_S,
@@ -32,8 +33,6 @@ from roller_env.units import quants
 
 DEFAULT: Final = PRESETS["default"]
 FAST: Final = PRESETS["fast"]
-GATE_SPEED_M_S: Final = quants(32.0)
-"""The original's gates."""
 
 
 def without_force_limits(compiled: CompiledLevel) -> CompiledLevel:
@@ -53,8 +52,8 @@ def blow_up() -> Failure:
 
     address = int(compile_level(gate, DEFAULT).gate_qpos[0])
 
-    def way(record: Record) -> Float64:
-        return 1e3 * (record.qpos[:, address] + GATE_SPEED_M_S * record.time_s)
+    def way(record: Path) -> Float64:
+        return 1e3 * (record.qpos[:, address] + GATE_SPEED_M_S * record.time)
 
     return Failure(
         name="blow_up",
@@ -71,9 +70,9 @@ def blow_up() -> Failure:
             setting("implicitfast, 1/240 s", DEFAULT),
             setting("Euler, 1/480 s", replace(DEFAULT, integrator="Euler", dt_s=1 / 480)),
         ),
-        curve=lambda record: (record.time_s, way(record)),
+        curve=lambda record: (record.time, way(record)),
         quantity="greatest distance after the first 0.1 s, mm",
-        value=lambda record: float(np.abs(way(record)[record.time_s > 0.1]).max()),
+        value=lambda record: float(np.abs(way(record)[record.time > 0.1]).max()),
         says="{:,.0f} mm off",
         acceptable=2.0 * 1e3 * 2.0 * GATE_SPEED_M_S / 200.0,
         limit_reason="twice the 2 v / w by which a servo trails its set-point",
@@ -97,7 +96,7 @@ def tunnelling() -> Failure:
 
         return Setting(label, spec.compile(), prepare)
 
-    def centre(record: Record) -> Float64:
+    def centre(record: Path) -> Float64:
         return record.qpos[:, 2] + RADIUS_M
 
     return Failure(
@@ -114,7 +113,7 @@ def tunnelling() -> Failure:
             setting("tau = 20 ms, speculative contacts", TAU_S, speculative=True),
             setting("tau = 5 ms", 0.005, speculative=False),
         ),
-        curve=lambda record: (1e3 * record.time_s, centre(record)),
+        curve=lambda record: (1e3 * record.time, centre(record)),
         quantity="greatest depth of the ball, mm",
         value=lambda record: 1e3 * float(RADIUS_M - centre(record).min()),
         says="{:.0f} mm deep",
@@ -146,7 +145,7 @@ def bent_heading() -> Failure:
         course = _skidding(preset, speed, angle)
         return Setting(label, course.compiled.model, course.prepare)
 
-    def heading(record: Record) -> Float64:
+    def heading(record: Path) -> Float64:
         return np.asarray(np.degrees(np.arctan2(record.qvel[:, 1], record.qvel[:, 0])))
 
     return Failure(
@@ -162,7 +161,7 @@ def bent_heading() -> Failure:
             setting("pyramidal cone", replace(DEFAULT, cone="pyramidal")),
             setting("elliptic cone", DEFAULT),
         ),
-        curve=lambda record: (record.time_s, heading(record)),
+        curve=lambda record: (record.time, heading(record)),
         quantity="greatest change of heading, degrees",
         value=lambda record: float(np.abs(heading(record) - angle).max()),
         says="{:.1f}° off",
@@ -186,7 +185,7 @@ def restitution_gain() -> Failure:
 
         return Setting(label, spec.compile(), prepare)
 
-    def energy(record: Record) -> Float64:
+    def energy(record: Path) -> Float64:
         height = record.qpos[:, 2] + record.qvel[:, 2] ** 2 / (2.0 * 9.81)
         return np.asarray(np.maximum(height, 1e-4))
 
@@ -206,7 +205,7 @@ def restitution_gain() -> Failure:
                 Contact(solref=bouncy.solref, impedance=bouncy.solimp[0]),
             ),
         ),
-        curve=lambda record: (record.time_s, energy(record)),
+        curve=lambda record: (record.time, energy(record)),
         quantity="greatest energy over that of the drop",
         value=lambda record: float(energy(record).max() / energy(record)[0]),
         says="{:.3g}× the energy",
@@ -241,9 +240,9 @@ def seam_bump() -> Failure:
         course = Course(compiled, (0.0, 0.0, radius), (speed, 0.0, 0.0), (0.0, speed / radius, 0.0))
         return Setting(label, compiled.model, course.prepare)
 
-    def bump(record: Record) -> Float64:
+    def bump(record: Path) -> Float64:
         height = record.qpos[:, 2]
-        rolling = height[record.time_s > SETTLE_S]
+        rolling = height[record.time > SETTLE_S]
         return np.asarray(1e3 * (height - np.median(rolling)))
 
     return Failure(
@@ -261,11 +260,11 @@ def seam_bump() -> Failure:
             setting("merged into one box", seams=False),
         ),
         curve=lambda record: (
-            record.qpos[record.time_s > SETTLE_S, 0],
-            bump(record)[record.time_s > SETTLE_S],
+            record.qpos[record.time > SETTLE_S, 0],
+            bump(record)[record.time > SETTLE_S],
         ),
         quantity="greatest bump at 5 m/s, mm",
-        value=lambda record: float(bump(record)[record.time_s > SETTLE_S].max()),
+        value=lambda record: float(bump(record)[record.time > SETTLE_S].max()),
         says="{:.2f} mm high",
         acceptable=0.05,
         limit_reason="a rolling ball on a plane does not bump; 50 um for settling",
@@ -305,7 +304,7 @@ def crush() -> Failure:
     limited = compile_level(level, DEFAULT)
     address = int(limited.gate_qpos[0])
 
-    def edge(record: Record) -> Float64:
+    def edge(record: Path) -> Float64:
         return record.qpos[:, address] + 1.2
 
     return Failure(
@@ -321,7 +320,7 @@ def crush() -> Failure:
             setting("servo without limit", without_force_limits(compile_level(level, DEFAULT))),
             setting("the game's servo, at most 10 kN", limited),
         ),
-        curve=lambda record: (record.time_s, edge(record)),
+        curve=lambda record: (record.time, edge(record)),
         quantity="share of the ball's height that is squeezed, %",
         value=lambda record: 100.0 * float(1.0 - edge(record).min() / (2.0 * radius)),
         says="{:.0f} % squeezed",
@@ -364,7 +363,7 @@ def hop() -> Failure:
     rk4 = _skidding(replace(DEFAULT, integrator="RK4"), speed, 0.0)
     accurate = _skidding(PRESETS["accurate"], speed, 0.0)
 
-    def height(record: Record) -> Float64:
+    def height(record: Path) -> Float64:
         return 1e3 * (record.qpos[:, 2] - default.compiled.level.ball.radius)
 
     return Failure(
@@ -387,7 +386,7 @@ def hop() -> Failure:
             Setting("RK4, 1/240 s", rk4.compiled.model, rk4.prepare),
             Setting("accurate: RK4, 1/960 s", accurate.compiled.model, accurate.prepare),
         ),
-        curve=lambda record: (record.time_s, height(record)),
+        curve=lambda record: (record.time, height(record)),
         quantity="greatest height at 4 m/s of slip, mm",
         value=lambda record: float(height(record).max()),
         says="{:.0f} mm high",

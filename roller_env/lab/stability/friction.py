@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from roller_env.lab.methods import Cone, MujocoMethod
+from roller_env.lab.simulate import settled
 from roller_env.lab.stability.bisection import locate
 from roller_env.lab.stability.cases import Case, Effort, Finding
 from roller_env.lab.stability.scenes import (
@@ -37,9 +38,7 @@ def _on_the_floor(
     add_ball(spec, contact)
     add_floor(spec, contact)
     model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_step(model, data, round(SETTLE_S / dt_s))
-    return model, data
+    return model, settled(model, SETTLE_S)
 
 
 def pushed_speed(

@@ -9,43 +9,42 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
-from typing import Final, Literal
+from typing import Any, Final
 
 import numpy as np
 
 from roller_env.compile.compiled import CompiledLevel, compile_level
+from roller_env.game.actions import KEY_FORCE_N
+from roller_env.lab.game import (
+    DECK_M,
+    GATE_SPEED_M_S,
+    GROUND,
+    PLATE_SPEED_M_S,
+    RADIUS_M,
+    THROUGH_M,
+    TUBE_FALL_M,
+    Course,
+    Run,
+    make_level,
+    play,
+)
+from roller_env.lab.simulate import Float64
 from roller_env.lab.stability.cases import Effort
 from roller_env.lab.stability.failures import (
-    GATE_SPEED_M_S,
     VISIBLE_HOP,
     VISIBLE_HOP_MM,
     hanging_gate_level,
     seam_level,
     skid_level,
 )
-from roller_env.lab.stability.game import GROUND, Course, Float64, Run, make_level, play
 from roller_env.level import Level, load_level
 from roller_env.physics.presets import PRESETS, PhysicsPreset
 from roller_env.units import quants
 
-RADIUS_M: Final = quants(16.0)
-"""The original's ball."""
-
-KEY_N: Final = quants(200.0)
-PLATE_SPEED_M_S: Final = quants(1.6)
-DECK_M: Final = quants(16.0)
-"""Thickness of the original's decks."""
-
-TUBE_FALL_M: Final = 46.9
-"""The highest that a pad and a tube of the classic level throw the ball over a deck."""
-
 FULL_SPEED_M_S: Final = 15.0
 """Two keys held over the classic's start deck of 22 m: sqrt(2 · 5.08 sqrt 2 / 1.4 · 22)."""
-
-THROUGH_M: Final = RADIUS_M + DECK_M / 2
-"""A ball this deep in a deck has its centre past the middle and is pushed out below."""
 
 LOOKS_LIKE_CONTACT_M: Final = RADIUS_M / 10
 _THROUGH: Final = "deeper, the ball's centre is past the middle of a deck and it falls through"
@@ -88,22 +87,6 @@ class HardCase:
     runs: Callable[[PhysicsPreset, int], list[Run]]
     read: Callable[[Sequence[Run], PhysicsPreset], Iterator[Reading]]
     note: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class HardRow:
-    """One quantity of one case under one preset; the fields are `HardCase`'s and `Reading`'s."""
-
-    case: str
-    preset: str
-    title: str
-    quantity: str
-    value: float
-    limit: float
-    verdict: Literal["holds", "fails"]
-    reason: str
-    starts: int
-    note: str
 
 
 # What is read off ----------------------------------------------------------------------------
@@ -180,7 +163,7 @@ def _pressed_to_the_gate(preset: PhysicsPreset, starts: int) -> list[Run]:
             Course(
                 compiled,
                 (face, float(y), floor),
-                force_n=(KEY_N, 0.0, 0.0),
+                force_n=(KEY_FORCE_N, 0.0, 0.0),
                 movers_m_s=-GATE_SPEED_M_S,
             ),
             3.0,
@@ -218,7 +201,7 @@ def _wedged(preset: PhysicsPreset, starts: int) -> list[Run]:
                 compiled,
                 (2.6, -1.09 + RADIUS_M, RADIUS_M),
                 velocity=(-float(speed), 0.0, 0.0),
-                force_n=(-KEY_N, 0.0, 0.0),
+                force_n=(-KEY_FORCE_N, 0.0, 0.0),
                 movers_m_s=-GATE_SPEED_M_S,
             )
             runs.append(play(course, 2.5))
@@ -431,26 +414,29 @@ HARD_CASES: Final[dict[str, HardCase]] = {
 """By name."""
 
 
-def run_case(case: HardCase, presets: Iterable[PhysicsPreset], effort: Effort) -> list[HardRow]:
-    """Return the case's rows under each preset."""
-    return [row for preset in presets for row in _rows(case, preset, effort.starts)]
+def run_case(
+    case: HardCase, presets: Iterable[PhysicsPreset], effort: Effort
+) -> list[dict[str, Any]]:
+    """Return the case's rows under each preset.
 
-
-def _rows(case: HardCase, preset: PhysicsPreset, starts: int) -> Iterator[HardRow]:
-    runs = case.runs(preset, starts)
-    for reading in case.read(runs, preset):
-        yield HardRow(
-            case=case.name,
-            preset=preset.name,
-            title=case.title,
-            quantity=reading.quantity,
-            value=reading.value,
-            limit=reading.limit,
-            verdict="holds" if reading.value <= reading.limit else "fails",
-            reason=reading.reason,
-            starts=len(runs),
-            note=case.note,
-        )
+    Returns:
+        ``case``, ``preset``, ``title``, and of each `Reading` the ``quantity``, ``value``,
+        ``limit``, ``reason`` and ``verdict`` (holds or fails); ``starts`` and the ``note``.
+    """
+    rows = []
+    for preset in presets:
+        runs = case.runs(preset, effort.starts)
+        rows += [
+            {"case": case.name, "preset": preset.name, "title": case.title}
+            | asdict(reading)
+            | {
+                "verdict": "holds" if reading.value <= reading.limit else "fails",
+                "starts": len(runs),
+                "note": case.note,
+            }
+            for reading in case.read(runs, preset)
+        ]
+    return rows
 
 
 ALL_PRESETS: Final = tuple(PRESETS.values())

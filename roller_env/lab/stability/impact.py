@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from roller_env.lab.methods import MujocoIntegrator, MujocoMethod
+from roller_env.lab.simulate import Float64, record
 from roller_env.lab.stability.cases import Case, Effort, Finding
 from roller_env.lab.stability.scenes import (
     EULER,
@@ -51,11 +52,8 @@ def impact(
     data = mujoco.MjData(model)
     data.qpos[2] = (1.0 - phase) * dt_s
     data.qvel[2] = -1.0
-    deepest = 0.0
-    for _ in range(2 + math.ceil(10.0 * TAU_S / dt_s)):
-        mujoco.mj_step(model, data)
-        deepest = max(deepest, -float(data.qpos[2]))
-    return deepest, float(data.qvel[2])
+    path = record(model, data, 2 + math.ceil(10.0 * TAU_S / dt_s))
+    return max(0.0, -float(path.qpos[:, 2].min())), float(data.qvel[2])
 
 
 ARRIVALS: Final = 2001
@@ -150,7 +148,7 @@ BOUNCE_S: Final = 10.0
 
 def bounce_path(
     integrator: MujocoIntegrator, dt_s: float, drop: float, contact: Contact
-) -> np.ndarray:
+) -> Float64:
     """Return the heights, m, (steps,), of a ball's lowest point that bounces for `BOUNCE_S`."""
     spec = new_spec(MujocoMethod(integrator), dt_s, GRAVITY)
     add_ball(spec, contact)
@@ -158,11 +156,7 @@ def bounce_path(
     model = spec.compile()
     data = mujoco.MjData(model)
     data.qpos[2] = drop
-    path = np.empty(round(BOUNCE_S / dt_s))
-    for step in range(len(path)):
-        mujoco.mj_step(model, data)
-        path[step] = data.qpos[2]
-    return path
+    return record(model, data, round(BOUNCE_S / dt_s)).qpos[1:, 2]
 
 
 def _measure_bounce(integrator: MujocoIntegrator, dt_s: float, effort: Effort) -> Finding:

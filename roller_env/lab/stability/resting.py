@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from roller_env.lab.methods import MujocoIntegrator, MujocoMethod
+from roller_env.lab.simulate import Float64, record, stays
 from roller_env.lab.stability.bisection import locate
 from roller_env.lab.stability.cases import Case, Effort, Finding
 from roller_env.lab.stability.scenes import (
@@ -44,9 +45,11 @@ def sink_of_a_pushed_ball(method: MujocoMethod, dt_s: float, tau_s: float) -> fl
     model = spec.compile()
     data = mujoco.MjData(model)
     start = float(data.mocap_pos[0, 0])
-    for step in range(200 + math.ceil(60.0 * tau_s / dt_s)):
-        mujoco.mj_step(model, data)
-        data.mocap_pos[0, 0] = start + (step + 1) * dt_s
+
+    def move(step: int) -> None:
+        data.mocap_pos[0, 0] = start + step * dt_s
+
+    record(model, data, 200 + math.ceil(60.0 * tau_s / dt_s), before=move)
     return float(data.mocap_pos[0, 0] - start - data.qpos[0])
 
 
@@ -94,11 +97,7 @@ def resting_stays(integrator: MujocoIntegrator, steps: int, share: float) -> boo
     data = mujoco.MjData(model)
     data.qpos[2] = -(1.0 - contact.impedance) * GRAVITY * TAU_S**2
     data.qvel[2] = kick = 1e-9
-    for _ in range(steps // 8):
-        mujoco.mj_step(model, data, 8)
-        if not abs(data.qvel[2]) < 1e3 * kick:
-            return False
-    return True
+    return stays(model, data, steps, lambda: bool(abs(data.qvel[2]) < 1e3 * kick))
 
 
 def _measure_resting(integrator: MujocoIntegrator, predicted: float, effort: Effort) -> Finding:
@@ -176,7 +175,7 @@ SEAMS: Final = 4
 
 def roll_over_seams(
     dt_s: float, speed: float, phase: float, *, merged: bool
-) -> tuple[np.ndarray, np.ndarray, float]:
+) -> tuple[Float64, Float64, float]:
     """Roll a ball over the seams of coplanar tiles.
 
     Args:
@@ -203,12 +202,8 @@ def roll_over_seams(
     mujoco.mj_step(model, data, round(SETTLE_S / dt_s))
     rest = float(data.qpos[2])
     data.qvel[0], data.qvel[4] = speed, speed / RADIUS_M
-    steps = round(SEAMS * TILE_M / (speed * dt_s))
-    path = np.empty((steps, 2))
-    for step in range(steps):
-        mujoco.mj_step(model, data)
-        path[step] = data.qpos[0], data.qpos[2] - rest
-    return path[:, 0], path[:, 1], float(data.qvel[0]) / speed - 1.0
+    path = record(model, data, round(SEAMS * TILE_M / (speed * dt_s))).qpos[1:]
+    return path[:, 0], path[:, 2] - rest, float(data.qvel[0]) / speed - 1.0
 
 
 def rest_depth(contact: Contact) -> float:

@@ -8,12 +8,39 @@ from typing import Any, Final
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from roller_env.compile.compiled import CompiledLevel
+from roller_env.config import EnvConfig
+from roller_env.game.actions import forces, held_keys
+from roller_env.lab.simulate import Float64, record, started
 from roller_env.level import Level, load_level
+from roller_env.simulation import Simulation
+from roller_env.units import quants
 
-Float64 = npt.NDArray[np.float64]
+LOST: Final = 1e6
+"""No number of a ball in the game is so large, m, m/s or rad/s."""
+
+RADIUS_M: Final = quants(16.0)
+MASS_KG: Final = 1.0
+GRAVITY_M_S2: Final = quants(386.0)
+FRICTION: Final = 0.3
+"""The game's ball, gravity and friction: docs of the original, in `roller_env.level.schema`."""
+
+DECK_M: Final = quants(16.0)
+"""Thickness of the original's decks."""
+THROUGH_M: Final = RADIUS_M + DECK_M / 2
+"""A ball this deep in a deck has its centre past the middle and is pushed out below."""
+
+GATE_SPEED_M_S: Final = quants(32.0)
+PLATE_SPEED_M_S: Final = quants(1.6)
+"""The original's gates and plates."""
+
+LIFT_N: Final = quants(500.0)
+LIFT_S: Final = 5.0
+"""The original's lift pad on its ball, and for how long."""
+
+TUBE_FALL_M: Final = 46.9
+"""The highest that a pad and a tube of the classic level throw the ball over a deck."""
 
 GROUND: Final[Mapping[str, Any]] = {"at": (0.0, 0.0, -2.0), "size": (400.0, 400.0, 4.0)}
 """A wide thick floor with its upper face at z = 0."""
@@ -23,7 +50,7 @@ def make_level(**pieces: Any) -> Level:
     """Return a checked level of ``pieces``, on wide ground unless they say otherwise."""
     plain: dict[str, Any] = {
         "name": "experiment",
-        "start": {"at": (-150.0, -150.0, 0.4064)},
+        "start": {"at": (-150.0, -150.0, RADIUS_M)},
         "finish": {"at": (190.0, 190.0, 0.5), "size": (1.0, 1.0, 1.0)},
         "boxes": [dict(GROUND)],
     }
@@ -97,20 +124,24 @@ def play(course: Course, seconds: float) -> Run:
     """Simulate, and look at every step."""
     compiled = course.compiled
     model, level = compiled.model, compiled.level
-    data = mujoco.MjData(model)
-    course.prepare(data)
+    data = started(model, course.prepare)
     steps = round(seconds / compiled.preset.dt_s)
-    motion = np.full((steps + 1, 9), np.nan)
     depth = np.zeros(steps + 1)
-    velocity = slice(compiled.ball_qvel, compiled.ball_qvel + 6)
-    for index in range(steps + 1):
-        # Contacts of this very position; the step below finds them again by itself.
+    first = compiled.ball_qvel
+
+    def look(step: int) -> None:
+        # Contacts of this very position; the step after it finds them again by itself.
         mujoco.mj_fwdPosition(model, data)
-        motion[index, :3], motion[index, 3:] = data.qpos[course.ball], data.qvel[velocity]
-        depth[index] = -min(0.0, data.contact.dist.min()) if data.ncon else 0.0
-        if not np.abs(motion[index]).max() < 1e6:
-            break
-        mujoco.mj_step(model, data)
+        depth[step] = -min(0.0, data.contact.dist.min()) if data.ncon else 0.0
+
+    def sane() -> bool:
+        ball = (*data.qpos[course.ball], *data.qvel[first : first + 6])
+        return bool(np.abs(ball).max() < LOST)
+
+    path = record(model, data, steps, before=look, goes_on=sane)
+    motion = np.full((steps + 1, 9), np.nan)
+    motion[: len(path.time), :3] = path.qpos[:, course.ball]
+    motion[: len(path.time), 3:] = path.qvel[:, first : first + 6]
     # A sphere's energy of spin for each kg is (R w)² / 5.
     rim = level.ball.radius * motion[:, 6:]
     energy = 0.5 * (motion[:, 3:6] ** 2).sum(1) + 0.2 * (rim**2).sum(1)
@@ -121,5 +152,36 @@ def play(course: Course, seconds: float) -> Run:
         velocity=motion[:, 3:6],
         energy=energy + level.gravity * motion[:, 2] - work / level.ball.mass_kg,
         depth=depth,
-        finite=bool(np.abs(motion).max() < 1e6),
+        finite=bool(np.abs(motion).max() < LOST),
     )
+
+
+def played(
+    config: EnvConfig, keys: Sequence[tuple[str, float]], seed: int
+) -> tuple[Float64, Float64]:
+    """Play keys through the product's own simulation, rules and all.
+
+    Args:
+        config: of the game.
+        keys: of ``wasd``, and for how many seconds each are held.
+        seed: by which the ball's place at the start is drawn.
+
+    Returns:
+        Where the ball began, (3,) m, and what the actuators did in each control step, (steps, nu),
+        so that it can be repeated open loop: events that are quantised to control steps then fall
+        alike with every method.
+    """
+    simulation = Simulation(config)
+    simulation.seed([np.random.default_rng(seed)])
+    simulation.reset()
+    model = simulation.compiled.model
+    data = mujoco.MjData(model)
+    start, ctrl = simulation.ball_position[0].copy(), []
+    for held, seconds in keys:
+        force = forces("keys", held_keys(held)[None])
+        for _ in range(round(seconds / config.control_dt_s)):
+            simulation.step(force)
+            state: Float64 = simulation.snapshot().physics[0]
+            mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+            ctrl.append(data.ctrl.copy())
+    return start, np.array(ctrl)

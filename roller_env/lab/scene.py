@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal, Protocol, runtime_checkable
+from typing import Any, Final, Literal, Protocol, runtime_checkable
 
 from roller_env.lab.methods import Method, without_warnings
-from roller_env.lab.timing import WallTime, wall_time
+from roller_env.lab.runner import cpu_time
 
 ErrorKind = Literal["discretisation", "model"]
 ERROR_KINDS: Final[tuple[ErrorKind, ...]] = ("discretisation", "model")
@@ -103,51 +103,35 @@ class Scene(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
-    """One row of the results: one measure of one method with one time step on one scene."""
+def measure(scene: Scene, method: Method, dt_s: float, repeats: int) -> list[dict[str, Any]]:
+    """Run one method with one time step, and return a point for each of the scene's measures.
 
-    scene: str
-    method: str
-    measure: str
-    kind: ErrorKind
-    dt_s: float
-    error: float
-    failed: bool
-    wall_s_per_s: float
-    """Median wall seconds for a simulated second."""
-    wall_spread: float
-    evaluations_per_s: float
-    """Evaluations of the forces for a simulated second."""
-
-
-def measure(scene: Scene, method: Method, dt_s: float, repeats: int) -> list[Point]:
-    """Run one method with one time step, and return a point for each of the scene's measures."""
+    Returns:
+        Rows of ``scene``, ``method``, ``measure``, ``kind``, ``dt_s``, ``error``, ``failed``,
+        ``cpu_s_per_s`` and ``evaluations_per_s`` (median CPU seconds, and evaluations of the
+        forces, for a simulated second) and ``cpu_spread``.
+    """
     trial = scene.trial(method, dt_s)
     with without_warnings():
-        wall, timed_s = _timed(trial, scene.horizon_s, repeats)
+        if isinstance(trial, SteadyTrial):
+            trial.run()
+            cpu, timed_s = cpu_time(trial.run_part, repeats), trial.part_s
+        else:
+            cpu, timed_s = cpu_time(trial.run, repeats), scene.horizon_s
     errors = trial.errors()
     failed = not errors[scene.measures[0].name] < scene.failure
     return [
-        Point(
-            scene=scene.name,
-            method=method.name,
-            measure=one.name,
-            kind=one.kind,
-            dt_s=dt_s,
-            error=errors[one.name],
-            failed=failed,
-            wall_s_per_s=wall.median_s / timed_s,
-            wall_spread=wall.spread,
-            evaluations_per_s=method.evaluations / dt_s,
-        )
+        {
+            "scene": scene.name,
+            "method": method.name,
+            "measure": one.name,
+            "kind": one.kind,
+            "dt_s": dt_s,
+            "error": errors[one.name],
+            "failed": failed,
+            "cpu_s_per_s": cpu.value / timed_s,
+            "cpu_spread": cpu.spread,
+            "evaluations_per_s": method.evaluations / dt_s,
+        }
         for one in scene.measures
     ]
-
-
-def _timed(trial: Trial, horizon_s: float, repeats: int) -> tuple[WallTime, float]:
-    """Run a trial, time it, and return how long it took and the simulated seconds of that."""
-    if isinstance(trial, SteadyTrial):
-        trial.run()
-        return wall_time(trial.run_part, repeats), trial.part_s
-    return wall_time(trial.run, repeats), horizon_s

@@ -1,45 +1,21 @@
-"""Model no more than the scene needs: what each thing left out, or put in, costs."""
+"""Ablations of the model: what each thing that the compiler leaves out, or puts in, costs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 import numpy as np
 
 from roller_env.compile.mjcf import BALL, build_spec
-from roller_env.lab.benchmark.levels import level_of_boxes
-from roller_env.lab.presets.cost import Runner, costs
+from roller_env.lab.benchmark.scale import level_of_boxes
+from roller_env.lab.presets.results import Games, costs
 from roller_env.lab.presets.setting import pair_with_ball, set_flag
+from roller_env.lab.table import Frame, frame
 from roller_env.level import Level, load_level
 from roller_env.level.expand import coin_positions, solids
 from roller_env.physics.presets import PRESETS
-
-
-@dataclass(frozen=True, slots=True)
-class EconomyRow:
-    """One way to model the classic level, or a level of so many boxes.
-
-    Attributes:
-        what: how it is modelled.
-        chosen: whether the compiler does it so.
-        boxes: of the level of boxes; 0 for the classic level.
-        geoms: of the model.
-        us_per_step: CPU microseconds, median over the rounds.
-        spread: (largest - smallest) / median.
-        same_bits: whether the ball's way is the chosen model's, to the bit.
-    """
-
-    what: str
-    chosen: bool
-    boxes: int
-    geoms: int
-    us_per_step: float
-    spread: float
-    same_bits: bool
-
 
 Change = Callable[[mujoco.MjSpec, Level], None]
 
@@ -165,40 +141,46 @@ _SIZES: Final[dict[str, Change]] = {
 """Ways to model levels of many boxes."""
 
 
-def measure(rounds: int, boxes: Sequence[int], games: int) -> list[EconomyRow]:
+def measure(rounds: int, boxes: Sequence[int], games: int) -> Frame:
     """Measure every way to model the classic level, and levels of more and more boxes.
 
     Args:
         rounds: turns over which costs are medians.
         boxes: sizes of the levels.
         games: that are stepped together.
+
+    Returns:
+        ``boxes`` (0 for the classic level), ``what`` is modelled otherwise, ``chosen`` (as the
+        compiler does it), ``geoms``, ``us_per_step`` (CPU, median) with its ``spread``, and
+        ``same_bits``: whether the ball's way is the chosen model's, to the bit.
     """
-    rows = _race({0: (load_level("classic"), CLASSIC)}, rounds, games)
-    return rows + _race({count: (level_of_boxes(count), _SIZES) for count in boxes}, rounds, games)
+    rows = _compared({0: (load_level("classic"), CLASSIC)}, rounds, games)
+    sizes = {count: (level_of_boxes(count), _SIZES) for count in boxes}
+    return frame(rows + _compared(sizes, rounds, games))
 
 
-def _race(
+def _compared(
     levels: Mapping[int, tuple[Level, Mapping[str, Change]]], rounds: int, games: int
-) -> list[EconomyRow]:
+) -> list[dict[str, Any]]:
     """Let every way to model each level, by the number of its boxes, take turns."""
-    models, runners = {}, {}
+    models, played = {}, {}
     for boxes, (level, changes) in levels.items():
         for what, change in changes.items():
             model = _model(level, change)
             models[boxes, what] = model
-            runners[f"{boxes} {what}"] = Runner(model, level.start.at, games)
-    taken = costs(runners, rounds)
-    balls = {boxes: runners[f"{boxes} {AS_CHOSEN}"].ball for boxes in levels}
+            played[f"{boxes} {what}"] = Games(model, level.start.at, games)
+    taken = costs(played, rounds)
+    balls = {boxes: played[f"{boxes} {AS_CHOSEN}"].ball for boxes in levels}
     return [
-        EconomyRow(
-            what=what,
-            chosen=what == AS_CHOSEN,
-            boxes=boxes,
-            geoms=model.ngeom,
-            us_per_step=taken[f"{boxes} {what}"].us_per_step,
-            spread=taken[f"{boxes} {what}"].spread,
-            same_bits=bool(np.array_equal(runners[f"{boxes} {what}"].ball, balls[boxes])),
-        )
+        {
+            "what": what,
+            "chosen": what == AS_CHOSEN,
+            "boxes": boxes,
+            "geoms": model.ngeom,
+            "us_per_step": 1e6 * taken[f"{boxes} {what}"].value,
+            "spread": taken[f"{boxes} {what}"].spread,
+            "same_bits": bool(np.array_equal(played[f"{boxes} {what}"].ball, balls[boxes])),
+        }
         for (boxes, what), model in models.items()
     ]
 

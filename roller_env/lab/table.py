@@ -1,29 +1,23 @@
-"""Results as files: rows of one dataclass, as CSV and JSON with provenance, and as Markdown."""
+"""Results as tables: pandas frames, which become CSV and JSON with provenance, and Markdown."""
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-import math
-from collections.abc import Sequence
-from dataclasses import asdict, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from roller_env.lab.provenance import header
+import numpy as np
+from pandas import DataFrame as Frame
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
+from roller_env.lab.runner import header
+
+__all__ = ["Frame", "frame", "markdown", "write"]
 
 
-def write_rows(
-    rows: Sequence[DataclassInstance], facts: dict[str, str], stem: Path
-) -> tuple[Path, Path]:
-    """Write ``rows`` as ``stem.csv`` and ``stem.json``; return both paths.
-
-    The CSV begins with one comment line of provenance. What is not finite is an empty cell and
-    ``null``: strict JSON has neither infinity nor NaN.
+def frame(rows: Sequence[Any]) -> Frame:
+    """Return rows, mappings or objects of one dataclass, as a frame.
 
     Raises:
         ValueError: no rows, or rows of different classes.
@@ -32,16 +26,25 @@ def write_rows(
     if len(kinds) != 1:
         names = sorted(kind.__name__ for kind in kinds)
         raise ValueError(f"a table needs rows of one kind, found {names or 'none'}")
-    records = [{name: _finite(value) for name, value in asdict(row).items()} for row in rows]
-    text = io.StringIO()
-    text.write(f"# {header(facts)}\n")
-    writer = csv.DictWriter(text, [field.name for field in fields(rows[0])], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(records)
+    return Frame(
+        [asdict(row) if is_dataclass(row) and not isinstance(row, type) else row for row in rows]
+    )
+
+
+def write(table: Frame | Sequence[Any], facts: Mapping[str, str], stem: Path) -> tuple[Path, Path]:
+    """Write a frame, or rows of one, as ``stem.csv`` and ``stem.json``; return both paths.
+
+    The CSV begins with one comment line of provenance. What is not finite is an empty cell and
+    ``null``: strict JSON has neither infinity nor NaN.
+    """
+    table = table if isinstance(table, Frame) else frame(table)
+    finite = table.replace([np.inf, -np.inf], np.nan).astype(object)
+    finite = finite.where(finite.notna(), None)
     stem.parent.mkdir(parents=True, exist_ok=True)
     csv_file, json_file = (stem.with_name(f"{stem.name}.{kind}") for kind in ("csv", "json"))
-    csv_file.write_text(text.getvalue(), encoding="utf-8")
-    document = {"provenance": facts, "rows": records}
+    text = f"# {header(facts)}\n" + finite.to_csv(index=False, lineterminator="\n")
+    csv_file.write_text(text, encoding="utf-8")
+    document = {"provenance": dict(facts), "rows": finite.to_dict("records")}
     json_file.write_text(json.dumps(document, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     return csv_file, json_file
 
@@ -58,10 +61,6 @@ def markdown(titles: Sequence[str], cells: Sequence[Sequence[object]]) -> str:
     ]
     lines += ["| " + " | ".join(_cell(value) for value in row) + " |" for row in cells]
     return "\n".join(lines) + "\n"
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _cell(value: object) -> str:

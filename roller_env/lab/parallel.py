@@ -1,0 +1,534 @@
+"""The parallel cube: the report's rigid body and MuJoCo's free joint through the same flights.
+
+Both get the same mass, inertia, start, gravity, keys, lift, damping and torque, and are compared
+with one another and with a **reference**, over time. The reference is a closed form of
+`roller_env.rigid_body.exact` for the linear motion and for every free rotation, and
+`exact.reference` for the rotations under damping or torque; it was compared with a Taylor series in
+40 digits that shares no code with it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from pandas import concat
+
+from roller_env.lab import chart
+from roller_env.lab.free import Acting, FreeScene, Truth, Vector, in_rows
+from roller_env.lab.game import GRAVITY_M_S2, LIFT_N, LIFT_S
+from roller_env.lab.methods import Method, MujocoMethod, RigidBodyMethod
+from roller_env.lab.runner import known
+from roller_env.lab.table import Frame, frame, markdown
+from roller_env.rigid_body import (
+    LIE_RK4,
+    RK4,
+    RK4_BODY,
+    SPLITTING4,
+    Body,
+    Integrator,
+    PiecewiseConstantForce,
+    State,
+    driving_torque,
+    exact,
+    key_sequence,
+    quaternion,
+)
+from roller_env.rigid_body.arrays import Float64, positive_time
+
+AGREEMENT: Final = 1e-9
+"""The two sides agree when position, m, and attitude, rad, stay within this of one another."""
+
+REFERENCE_ERROR: Final[Mapping[str, float]] = {"position_m": 5e-13, "attitude_rad": 5e-13}
+"""What the reference itself may be wrong by in 10 s. Measured against 40 digits: 2.2e-13 rad for
+the thrown box, whose closed form is next to its separatrix, and at most 1.3e-13 rad else."""
+
+MOMENTS: Final = 100
+"""At most so many moments of a flight are compared; the last step always is."""
+
+# --- what is flown ---------------------------------------------------------------------------
+
+WEIGHT_M_S2: Final[Vector] = (0.0, 0.0, -GRAVITY_M_S2)
+
+
+START_ORIENTATION: Final = (0.8, 0.2, -0.4, 0.4)
+"""A unit quaternion with no special direction, so that no axis hides another."""
+
+BODIES: Final[Mapping[str, Body]] = {
+    "cube": Body.cube(size=1.0, mass=1.0),
+    "box": Body.box(size=(0.1, 0.4, 0.9), mass=10.0),
+}
+"""The report's cube, and the slender box of the free-body benchmark (scpeters/benchmark)."""
+
+
+FREE: Final = Acting()
+
+
+@dataclass(frozen=True)
+class Flight:
+    """How a flight begins, and what acts.
+
+    Attributes:
+        title: what people read.
+        velocity_m_s: at the start, world axes.
+        spin_rad_s: angular velocity at the start, **body** axes: that is where a box's axes differ.
+        acting: forces and torques.
+    """
+
+    title: str
+    velocity_m_s: Vector
+    spin_rad_s: Vector
+    acting: Acting = FREE
+
+    def start(self, body: Body) -> State:
+        """Return the state in which ``body``, one of `BODIES`, begins."""
+        q = np.array([START_ORIENTATION])
+        return State.create(
+            body,
+            orientation=START_ORIENTATION,
+            velocity=self.velocity_m_s,
+            angular_velocity=quaternion.rotate(q, np.array([self.spin_rad_s])),
+        )
+
+
+KEYS_HELD: Final = ((0.0, "W"), (1.0, "WA"), (2.5, "A"), (4.0, "SD"), (6.5, "D"), (8.0, ""))
+"""The WASD sequence: every key, singly and in pairs, and none. (time in s, keys from then on)."""
+
+_LIFT: Final = PiecewiseConstantForce(
+    np.array([0.0, LIFT_S]), np.array([(0.0, 0.0, LIFT_N), (0.0, 0.0, 0.0)])
+)
+
+FLIGHTS: Final[Mapping[str, Flight]] = {
+    "drift": Flight("drift and spin, no gravity", (-0.9, 0.4, 0.1), (3.0, -5.0, 2.0)),
+    "ballistic": Flight(
+        "thrown, spun about the box's middle axis",
+        (-2.0, 2.0, 8.0),
+        (0.1, 5.0, 0.1),
+        Acting(WEIGHT_M_S2),
+    ),
+    "keys": Flight(
+        "WASD key sequence in free fall",
+        (0.0, 0.0, 5.0),
+        (2.0, 3.0, -4.0),
+        Acting(WEIGHT_M_S2, held=key_sequence(KEYS_HELD)),
+    ),
+    "lift": Flight(
+        "lift of 12.7 N for 5 s",
+        (0.5, 0.0, 0.0),
+        (-3.0, 1.0, 5.0),
+        Acting(WEIGHT_M_S2, held=_LIFT),
+    ),
+    "damping": Flight(
+        "linear and angular damping",
+        (5.0, -3.0, 10.0),
+        (4.0, -4.0, 3.0),
+        Acting(WEIGHT_M_S2, drag_n_s_m=0.5, spin_damping_nm_s=0.05),
+    ),
+    "torque": Flight(
+        "the report's torque, (1, 0, 0) - 0.1 omega",
+        (1.0, 0.0, 0.0),
+        (1.0, -2.0, 3.0),
+        Acting(torque_nm=(1.0, 0.0, 0.0), spin_damping_nm_s=0.1),
+    ),
+}
+"""Flights by name. The first two start as the benchmark's free boxes do, but the first with a spin
+about no principal axis, which is harder than the benchmark's."""
+
+
+def parsed_keys(events: Iterable[str]) -> PiecewiseConstantForce:
+    """Return the key sequence written as ``0=W 1=WA 2.5=``: time in s, and the keys from then on.
+
+    Raises:
+        ValueError: on anything else, an unknown key, or times that do not rise.
+    """
+    sequence = []
+    for event in events:
+        time, separator, keys = event.partition("=")
+        try:
+            when = float(time)
+        except ValueError:
+            when = math.nan
+        if not separator or not math.isfinite(when):
+            raise ValueError(f"keys: found {event!r}; a time in s and keys, such as 1.5=WA")
+        sequence.append((when, keys.upper()))
+    return key_sequence(sequence)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What to compare.
+
+    Attributes:
+        bodies: names in `BODIES`.
+        flights: by name.
+        ours: a method of ours.
+        mujoco: a method of MuJoCo's.
+        dt_s: step of both, s.
+        duration_s: of every flight, s.
+
+    Raises:
+        ValueError: when a flight or the time between two jumps is no whole number of steps.
+    """
+
+    bodies: tuple[str, ...]
+    flights: Mapping[str, Flight]
+    ours: Integrator
+    mujoco: MujocoMethod
+    dt_s: float
+    duration_s: float
+
+    def __post_init__(self) -> None:
+        positive_time("dt", self.dt_s)
+        positive_time("duration", self.duration_s)
+        for what, time_s in self._boundaries():
+            steps = time_s / self.dt_s
+            if not _whole(steps):
+                raise ValueError(
+                    f"dt {self.dt_s:g} s: {what} {time_s:g} s, which is {steps:.6g} steps and has "
+                    f"to be a whole number of them; {time_s / math.ceil(steps):.9g} s would do"
+                )
+
+    def _boundaries(self) -> list[tuple[str, float]]:
+        """Return the times at which a step has to end, with what happens then."""
+        jumps = [
+            (f"the scene {name!r} changes its force at", float(t))
+            for name, flight in self.flights.items()
+            for t in flight.acting.jumps_s
+        ]
+        return [("a flight ends at", self.duration_s), *jumps]
+
+    def steps_s(self) -> list[float]:
+        """Return the steps at which other methods are tried, largest first: those that fit."""
+        times = [time_s for _, time_s in self._boundaries()]
+        tried = [factor * self.dt_s for factor in (4.0, 2.0, 1.0, 0.5)]
+        return [dt for dt in tried if all(_whole(time_s / dt) for time_s in times)]
+
+    def scene(self, body: str, name: str, dt_s: float) -> FreeScene:
+        """Return a flight of a body as a scene whose moments a step of ``dt_s`` divides."""
+        flight = self.flights[name]
+        steps = round(self.duration_s / dt_s)
+        moments = max(n for n in range(1, MOMENTS + 1) if steps % n == 0)
+        return FreeScene(
+            name=name,
+            title=flight.title,
+            start=flight.start(BODIES[body]),
+            exact=_truth(flight.acting),
+            quantities=(),
+            time_steps_s=(),
+            acting=flight.acting,
+            horizon_s=self.duration_s,
+            moments=moments,
+        )
+
+
+def _whole(steps: float) -> bool:
+    # 0.3 / 0.1 is not 3.
+    return abs(steps - round(steps)) <= 1e-6
+
+
+def _truth(acting: Acting) -> Truth:
+    """Return the true motion at rising times."""
+
+    def truth(many: State, times_s: Float64) -> State:
+        start = many.take([0])
+        if acting.spin_damping_nm_s or any(acting.torque_nm):
+            turned = _turned(acting, start, times_s)
+        elif start.body.isotropic:
+            turned = exact.constant_spin(many, times_s)
+        else:
+            turned = exact.asymmetric_top(many, times_s)
+        moved = _moved(acting, start, times_s)
+        return turned.recalculate(position=moved.position, momentum=moved.momentum)
+
+    return truth
+
+
+def _turned(acting: Acting, start: State, times_s: Float64) -> State:
+    """Return the rotation under torque and damping, integrated from each moment to the next."""
+    load = driving_torque(acting.torque_nm, acting.spin_damping_nm_s)
+    states = [start]
+    for begin, end in itertools.pairwise([0.0, *times_s.tolist()]):
+        states.append(exact.reference(states[-1], end - begin, load, start_s=begin))
+    return in_rows(states[1:])
+
+
+def _moved(acting: Acting, start: State, times_s: Float64) -> State:
+    """Return the linear motion, a closed form between the jumps of the held force."""
+    end = float(times_s[-1])
+    jumps = [float(t) for t in acting.jumps_s if 0.0 < t < end]
+    weight = start.body.mass[0] * np.array(acting.gravity_m_s2)
+    pieces: list[State] = []
+    for begin, stop in itertools.pairwise([0.0, *jumps, end]):
+        within = times_s[(times_s > begin) & (times_s <= stop)]
+        passed = np.append(within, stop) - begin
+        held = 0.0 if acting.held is None else acting.held.force_at_time(begin)
+        many = start.take([0] * len(passed))
+        reached = exact.linear_drag(many, passed, acting.drag_n_s_m, weight + held)
+        pieces += [reached.take([row]) for row in range(len(within))]
+        start = reached.take([-1])
+    return in_rows(pieces)
+
+
+# --- how far apart ---------------------------------------------------------------------------
+
+QUANTITIES: Final[Mapping[str, str]] = {
+    "position_m": "position, m",
+    "attitude_rad": "attitude, rad",
+    "momentum_kg_m_s": "momentum, kg m/s",
+    "angular_momentum_kg_m2_s": "angular momentum, kg m²/s",
+    "energy_j": "energy, J",
+}
+"""The columns of `apart`, with what people read."""
+
+PAIRS: Final = ("ours - MuJoCo", "ours - reference", "MuJoCo - reference")
+
+
+def flown(scene: FreeScene, method: Method, dt_s: float) -> State:
+    """Return a flight's moments as rows."""
+    trial = scene.trial(method, dt_s)
+    trial.run()
+    return trial.reached()
+
+
+def apart(a: State, b: State, gravity_m_s2: Vector) -> dict[str, Float64]:
+    """Return how far ``a`` and ``b``, rows of one body's moments, are apart in `QUANTITIES`.
+
+    Vectors by the length of their difference, attitude by the angle, energy (kinetic and potential)
+    by its absolute value.
+    """
+    height = (a.position - b.position) @ np.array(gravity_m_s2)
+    energy = a.kinetic_energy() - b.kinetic_energy() - a.body.mass * height
+    values = (
+        quaternion.norm(a.position - b.position),
+        quaternion.angle_between(a.rotation, b.rotation),
+        quaternion.norm(a.momentum - b.momentum),
+        quaternion.norm(a.angular_momentum - b.angular_momentum),
+        np.abs(energy),
+    )
+    return dict(zip(QUANTITIES, values, strict=True))
+
+
+def compare(settings: Settings, body: str) -> tuple[Frame, Frame]:
+    """Fly every scene three ways with one body.
+
+    Returns:
+        The largest differences, a row a scene: body, scene, ours, mujoco, dt_s, duration_s, the
+        `QUANTITIES` of ours from MuJoCo, both sides' errors of position and attitude, and the
+        verdict in words. And the differences over time: body, scene, pair, time_s, `QUANTITIES`.
+    """
+    verdicts, samples = [], []
+    for name, flight in settings.flights.items():
+        scene = settings.scene(body, name, settings.dt_s)
+        mine = flown(scene, RigidBodyMethod(settings.ours), settings.dt_s)
+        theirs = flown(scene, settings.mujoco, settings.dt_s)
+        motions = ((mine, theirs), (mine, scene.truth), (theirs, scene.truth))
+        gravity = flight.acting.gravity_m_s2
+        found = {pair: apart(*two, gravity) for pair, two in zip(PAIRS, motions, strict=True)}
+        largest = {
+            pair: {what: float(values.max()) for what, values in of_pair.items()}
+            for pair, of_pair in found.items()
+        }
+        verdicts.append(_verdict(settings, body, name, largest))
+        for pair, of_pair in found.items():
+            rows = Frame({"time_s": scene.times_s, **of_pair})
+            rows.insert(0, "pair", pair)
+            rows.insert(0, "scene", name)
+            rows.insert(0, "body", body)
+            samples.append(rows)
+    return frame(verdicts), concat(samples, ignore_index=True)
+
+
+def _verdict(
+    settings: Settings, body: str, scene: str, largest: Mapping[str, Mapping[str, float]]
+) -> dict[str, object]:
+    between, mine, theirs = (largest[pair] for pair in PAIRS)
+    return {
+        "body": body,
+        "scene": scene,
+        "ours": f"ours {settings.ours.name}",
+        "mujoco": settings.mujoco.name,
+        "dt_s": settings.dt_s,
+        "duration_s": settings.duration_s,
+        **between,
+        "ours_position_error_m": mine["position_m"],
+        "ours_attitude_error_rad": mine["attitude_rad"],
+        "mujoco_position_error_m": theirs["position_m"],
+        "mujoco_attitude_error_rad": theirs["attitude_rad"],
+        "verdict": _words(settings, between, mine, theirs),
+    }
+
+
+def _words(
+    settings: Settings,
+    between: Mapping[str, float],
+    mine: Mapping[str, float],
+    theirs: Mapping[str, float],
+) -> str:
+    """Return ``agree``, or which side is further from the truth, by what and how much."""
+    what, unit = (
+        ("attitude_rad", "rad") if between["position_m"] <= AGREEMENT else ("position_m", "m")
+    )
+    if max(between["position_m"], between["attitude_rad"]) <= AGREEMENT:
+        return "agree"
+    sides = {f"ours {settings.ours.name}": mine[what], settings.mujoco.name: theirs[what]}
+    right, wrong = sorted(sides, key=sides.__getitem__)
+    return f"{wrong} is off by {sides[wrong]:.1e} {unit}, {right} by {sides[right]:.1e}"
+
+
+REMEDIES: Final[Mapping[str, tuple[Integrator, str]]] = {
+    "rk4": (RK4, "the report's: momentum, world axes"),
+    "lie_rk4": (LIE_RK4, "turns instead of sums of quaternions"),
+    "rk4_body": (RK4_BODY, "body axes instead of world axes"),
+    "splitting4": (SPLITTING4, "exact turns about body axes"),
+}
+"""The report's method and what could mend it, each with the one thing that it exchanges."""
+
+
+def remedies(settings: Settings, body: str) -> Iterator[Frame]:
+    """Yield, step by step, how far the attitudes of other methods are from MuJoCo's and the truth.
+
+    Columns: body, scene, method, dt_s, against_mujoco_rad, error_rad, mujoco_error_rad; the
+    largest angles of a flight.
+    """
+    methods = {settings.ours.name: settings.ours}
+    methods |= {name: method for name, (method, _) in REMEDIES.items()}
+    steps_s = settings.steps_s()
+    for dt_s in steps_s:
+        rows = []
+        for name in settings.flights:
+            scene = settings.scene(body, name, steps_s[0])
+            theirs = flown(scene, settings.mujoco, dt_s)
+            for method in methods.values():
+                mine = flown(scene, RigidBodyMethod(method), dt_s)
+                rows.append(
+                    {
+                        "body": body,
+                        "scene": name,
+                        "method": method.name,
+                        "dt_s": dt_s,
+                        "against_mujoco_rad": _angle(mine, theirs),
+                        "error_rad": _angle(mine, scene.truth),
+                        "mujoco_error_rad": _angle(theirs, scene.truth),
+                    }
+                )
+        yield frame(rows)
+
+
+def _angle(a: State, b: State) -> float:
+    return float(quaternion.angle_between(a.rotation, b.rotation).max())
+
+
+def verdict_table(verdicts: Frame) -> str:
+    """Return the largest differences and who is wrong, for people, as Markdown."""
+    columns = ["body", "scene", *QUANTITIES, "verdict"]
+    titles = ["body", "scene", *QUANTITIES.values(), "verdict"]
+    return markdown(titles, verdicts[columns].values.tolist())
+
+
+def remedy_table(rows: Frame) -> str:
+    """Return the largest attitude differences from MuJoCo, rad, by method and step, as Markdown."""
+    wide = rows.pivot_table("against_mujoco_rad", ["method", "dt_s"], "scene", sort=False)
+    wide = wide.sort_index(level="dt_s", ascending=False, sort_remaining=False)
+    cells = [[name, 1e3 * dt, *apart] for (name, dt), apart in wide.T.to_dict("list").items()]
+    return markdown(["ours", "dt, ms", *(f"{scene}, rad" for scene in wide.columns)], cells)
+
+
+# --- pictures --------------------------------------------------------------------------------
+
+_FLOOR: Final = 1e-17
+"""Differences below this, nearly always exactly 0, leave the picture."""
+
+
+def draw_flights(settings: Settings, body: str, samples: Frame) -> Figure:
+    """Draw the differences over time: a row for each scene, a panel for each quantity."""
+    figure, panels = chart.grid(
+        (len(settings.flights), len(QUANTITIES)),
+        f"The {body} in parallel: {settings.mujoco.name} and our {settings.ours.name}, "
+        f"dt {1e3 * settings.dt_s:g} ms",
+        "Thick: how far each side is from the reference. Thin: how far they are from one another; "
+        "where a line is missing, it is 0 (under 1e-17).",
+        panel=(3.0, 2.1),
+        sharey="col",
+    )
+    lines = (
+        ("ours - reference", "our own error", chart.colour(f"ours {settings.ours.name}"), 3.6),
+        ("MuJoCo - reference", "MuJoCo's own error", chart.colour(settings.mujoco.name), 3.6),
+        ("ours - MuJoCo", "difference between the two", "#222222", 1.1),
+    )
+    for row, name in zip(panels, settings.flights, strict=True):
+        mine = samples[samples.scene == name]
+        for axes, what in zip(row, QUANTITIES, strict=True):
+            if what in REFERENCE_ERROR:
+                axes.axhspan(_FLOOR, REFERENCE_ERROR[what], color="#efefef", lw=0)
+                axes.axhline(AGREEMENT, color="#555555", lw=1.0, ls="--", label="agree to 1e-9")
+            for pair, label, colour, width in lines:
+                one = mine[mine.pair == pair]
+                shown = one[what].where(one[what] > _FLOOR)
+                alpha = 0.7 if width > 2.0 else 1.0
+                axes.plot(one.time_s, shown, color=colour, lw=width, alpha=alpha, label=label)
+            axes.set(yscale="log", xlim=(0.0, settings.duration_s))
+            axes.set_title(QUANTITIES[what], fontsize=9, color="#555555", loc="left")
+        row[0].set_ylabel(settings.flights[name].title, fontsize=8)
+    chart.legend_of(figure, panels[0, 1])
+    return figure
+
+
+def draw_remedies(settings: Settings, body: str, rows: Frame) -> Figure:
+    """Draw the attitude error against the time step: a panel for each scene, a line a method."""
+    columns = min(3, len(settings.flights))
+    figure, panels = chart.grid(
+        (math.ceil(len(settings.flights) / columns), columns),
+        f"The {body}: which part of the report's method makes its error",
+        f"largest attitude error in {settings.duration_s:g} s, rad, against the time step, ms",
+        panel=(4.6, 3.2),
+        sharey="all",
+    )
+    for axes, name in itertools.zip_longest(panels.ravel(), settings.flights):
+        if name is None:
+            axes.set_visible(False)
+            continue
+        _draw_remedies_of(axes, settings, rows[rows.scene == name])
+        axes.set_title(settings.flights[name].title, fontsize=10, loc="left")
+    chart.legend_of(figure, panels[0, 0])
+    return figure
+
+
+def _draw_remedies_of(axes: Axes, settings: Settings, rows: Frame) -> None:
+    theirs, name = rows.drop_duplicates("dt_s"), settings.mujoco.name
+    axes.plot(
+        1e3 * theirs.dt_s,
+        theirs.mujoco_error_rad,
+        color=chart.colour(name),
+        lw=5,
+        alpha=0.5,
+        label=name,
+    )
+    for method, mine in rows.groupby("method", sort=False):
+        label = f"{method}: {REMEDIES[method][1]}" if method in REMEDIES else method
+        axes.plot(
+            1e3 * mine.dt_s,
+            mine.error_rad,
+            "o-",
+            ms=4,
+            color=chart.colour(f"ours {method}"),
+            label=label,
+        )
+    axes.axhline(AGREEMENT, color="#555555", lw=1.0, ls="--", label="agree to 1e-9")
+    axes.set(xscale="log", yscale="log")
+    axes.set_xticks(1e3 * theirs.dt_s, [f"{1e3 * dt:g}" for dt in theirs.dt_s])
+    axes.minorticks_off()
+
+
+def chosen(what: str, name: str, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the name asked for, or every name for ``all``.
+
+    Raises:
+        ValueError: there is no such name; with the nearest.
+    """
+    return tuple(names) if name == "all" else (known(what, name, [*names, "all"]),)

@@ -1,0 +1,256 @@
+"""Things run against the clock, on machines that are shared and noisy, and where results stem from.
+
+Only what ran side by side can be compared. So everything that is compared takes turns, round by
+round, and a ratio is the median of the rounds' ratios: a machine that slows down meanwhile slows
+both sides.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import statistics
+import sys
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from difflib import get_close_matches
+from functools import partial
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from roller_env import __version__
+
+REPEATS: Final = 7
+"""Repetitions of which the median is taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class Median:
+    """A median over rounds, with the smallest and the largest."""
+
+    value: float
+    low: float
+    high: float
+
+    @staticmethod
+    def of(values: Sequence[float]) -> Median:
+        """Return the median of at least one value."""
+        return Median(statistics.median(values), min(values), max(values))
+
+    @property
+    def spread(self) -> float:
+        """(largest - smallest) / median: how far the machine can be believed."""
+        return (self.high - self.low) / self.value
+
+    def times(self, factor: float) -> Median:
+        """Return it in another unit."""
+        return Median(self.value * factor, self.low * factor, self.high * factor)
+
+
+def timed(work: Callable[[], object], clock: Callable[[], float] = time.perf_counter) -> float:
+    """Do ``work`` once and return the seconds by a clock: wall, this thread's or this process's."""
+    start = clock()
+    work()
+    return clock() - start
+
+
+def cpu_time(work: Callable[[], object], repeats: int = REPEATS) -> Median:
+    """Do ``work`` once to warm the caches and then ``repeats`` times; return CPU seconds.
+
+    They are this thread's own: of work in one thread, on a quiet machine, the wall time, and on a
+    busy one still the work's.
+
+    Raises:
+        ValueError: fewer repetitions than one.
+    """
+    if repeats < 1:
+        raise ValueError(f"repeats: found {repeats}; at least 1")
+    work()
+    return Median.of([timed(work, time.thread_time) for _ in range(repeats)])
+
+
+def interleaved(
+    runs: Mapping[str, Callable[[], float]], rounds: int, *, shuffled: bool = False
+) -> dict[str, tuple[float, ...]]:
+    """Let ``runs``, each of which returns its seconds, take turns; return them round by round.
+
+    Args:
+        runs: what takes turns, by name.
+        rounds: turns of each.
+        shuffled: in another order every round: who comes after the dearest, or while the machine is
+            slow, would otherwise be the same every time.
+    """
+    seconds: dict[str, list[float]] = {name: [] for name in runs}
+    order, random = list(runs), np.random.default_rng(0)
+    for _ in range(rounds):
+        if shuffled:
+            random.shuffle(order)
+        for name in order:
+            seconds[name].append(runs[name]())
+    return {name: tuple(taken) for name, taken in seconds.items()}
+
+
+# --- benchmark cases -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """How long an interleaved run is.
+
+    Attributes:
+        rounds: times that every case has its turn; medians are over these.
+        round_s: about how long one turn lasts, wall seconds.
+        warm_up_s: game time before the first round, so that the states have spread.
+    """
+
+    rounds: int
+    round_s: float
+    warm_up_s: float
+
+    def __post_init__(self) -> None:
+        """Refuse what measures nothing."""
+        if self.rounds < 1:
+            raise ValueError(f"rounds: found {self.rounds}; at least 1")
+        for name in ("round_s", "warm_up_s"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name}: found {getattr(self, name)}; must be more than 0")
+
+
+class Case(ABC):
+    """A benchmark case: something that can be stepped against the clock.
+
+    Attributes:
+        name: what tables call it.
+        env_steps: environment steps in one of its steps, such as the number of environments.
+        simulated_s: simulated time of one environment step; NaN where that means nothing.
+        steps_done: its steps so far.
+    """
+
+    def __init__(self, name: str, env_steps: int, simulated_s: float) -> None:
+        self.name, self.env_steps, self.simulated_s = name, env_steps, simulated_s
+        self.steps_done = 0
+
+    def run(self, steps: int) -> float:
+        """Do ``steps`` steps and return the wall seconds that they took."""
+        self.steps_done += steps
+        return self._run(steps)
+
+    @abstractmethod
+    def _run(self, steps: int) -> float:
+        """Do ``steps`` steps; preparations that a user would not pay for are not counted."""
+
+    def prepare(self, config: Config) -> int:
+        """Warm up, and return the steps of one round."""
+        self.run(max(1, round(config.warm_up_s / self.simulated_s)))
+        steps = 1
+        while (taken := self.run(steps)) < config.round_s / 4:
+            steps *= 2
+        return max(1, round(steps * config.round_s / taken))
+
+    def verify(self) -> None:  # noqa: B027 - most have nothing to verify
+        """Raise if what was timed was not what should have been."""
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What one benchmark case did: the seconds of one environment step, round by round."""
+
+    case: Case
+    seconds: tuple[float, ...]
+
+    @property
+    def env_steps_per_s(self) -> Median:
+        """Environment steps a wall second."""
+        return Median.of([1.0 / seconds for seconds in self.seconds])
+
+
+def compare(cases: Sequence[Case], config: Config) -> dict[str, Result]:
+    """Let cases take turns, round by round; return the results by name.
+
+    A case that follows another stands behind it.
+    """
+    steps = {case.name: case.prepare(config) for case in cases}
+
+    def turn(case: Case) -> float:
+        return case.run(steps[case.name]) / (steps[case.name] * case.env_steps)
+
+    turns = {case.name: partial(turn, case) for case in cases}
+    seconds = interleaved(turns, config.rounds)
+    for case in cases:
+        case.verify()
+    return {case.name: Result(case, seconds[case.name]) for case in cases}
+
+
+def speed_ratio(ours: Result, theirs: Result) -> Median:
+    """Return how many environment steps ``ours`` does while ``theirs`` does one."""
+    return Median.of([b / a for a, b in zip(ours.seconds, theirs.seconds, strict=True)])
+
+
+def simulated_ratio(ours: Result, theirs: Result) -> Median:
+    """Return how much simulated time ``ours`` passes while ``theirs`` passes one second."""
+    return speed_ratio(ours, theirs).times(ours.case.simulated_s / theirs.case.simulated_s)
+
+
+# --- provenance ------------------------------------------------------------------------------
+
+_PACKAGES: Final = ("mujoco", "numpy", "numba", "scipy")
+_CPU_INFO: Final = Path("/proc/cpuinfo")
+
+
+def provenance(packages: tuple[str, ...] = _PACKAGES) -> dict[str, str]:
+    """Return what a measurement depends on, by name.
+
+    Args:
+        packages: distributions whose versions are told; ``not installed`` for those that are not.
+    """
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return {
+        "command": " ".join([Path(sys.argv[0]).name, *sys.argv[1:]]),
+        "date": datetime.now(UTC).strftime("%Y-%m-%d"),
+        "machine": f"{_processor()}, {cores} cores, {platform.system()}",
+        "python": platform.python_version(),
+        "roller": __version__,
+        **{name: _version(name) for name in packages},
+    }
+
+
+def header(facts: Mapping[str, str]) -> str:
+    """Return provenance as one line for people."""
+    return " · ".join(f"{name} {value}" for name, value in facts.items())
+
+
+def _processor() -> str:
+    if _CPU_INFO.exists():
+        for line in _CPU_INFO.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+# --- names -----------------------------------------------------------------------------------
+
+
+def known(what: str, name: str, names: Sequence[str]) -> str:
+    """Return ``name``, which is to be one of ``names``.
+
+    Raises:
+        ValueError: it is none; the message has the nearest one.
+    """
+    if name not in names:
+        near = get_close_matches(name, names, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise ValueError(f"no {what} {name!r}: there are {', '.join(names)}{hint}")
+    return name
