@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from typing import Any
 
@@ -66,7 +67,7 @@ def test_no_example_of_the_page_is_warned_of_what_it_says_itself(example: str) -
         for kind in ("floors", "boxes", "ramps", "walls", "tubes", "lift_pads")
     ):
         assert [problem.path for problem in found] == [()]
-    elif "start" in example:
+    elif re.search(r"^start:", example, re.MULTILINE):
         assert found == []
     else:
         assert {str(problem.path[0]) for problem in found} <= LEFT_OUT.keys()
