@@ -156,7 +156,7 @@ def _flood(level: Level, play: Play, coins: Float64, struck: Bool) -> _Found | N
     spans = free_spans(solids, level.ball.radius, around)
     if spans is None:
         return None
-    lowest = min(finish.at[2] - finish.size[2], *(coins[:, 2] - COIN_REACH_M))
+    lowest = min([finish.at[2] - finish.size[2], *(coins[:, 2] - COIN_REACH_M)])
     flood = _Flood(level, play, spans, lowest)
     if not flood.begin():
         return None
@@ -350,7 +350,8 @@ class _Flood:
         """Let the ball roll and fly on from what has been reached."""
         spans, away, cap = self._spans, self.away, self.cap
         useful = min(float(spans.floor[self._support].min()) - self._climb, self._lowest)
-        farthest = int(motion.range(np.array(motion.apex - useful)) / spans.cell) + _NEAR
+        flight = float(motion.range(np.array(motion.apex - useful))) / spans.cell + _NEAR
+        farthest = int(min(flight, _FAR - 1))
         # How many columns it can fly before it would come down on each span.
         drop = motion.apex + self._climb - np.where(self._support, spans.floor, -np.inf)
         land = np.minimum(motion.range(drop) / spans.cell + _NEAR, float(_FAR))

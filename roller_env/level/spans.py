@@ -21,9 +21,9 @@ Bool = npt.NDArray[np.bool_]
 EDGE, FLAT, SLOPE = 0, 1, 2
 """What a ball rests on: an edge, a level face, a tilted face."""
 
-MAX_COLUMNS: Final = 2_000_000
-MAX_ENTRIES: Final = 6_000_000
-"""Columns of a grid, and solids met by them: some seconds of one core and 300 MB."""
+MAX_COLUMNS: Final = 1_000_000
+MAX_ENTRIES: Final = 4_000_000
+"""Columns of a grid, and solids met by them: about ten seconds of a busy core, and 500 MB."""
 
 _FINEST: Final = 0.5
 _COARSEST: Final = 0.9

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
 
 from roller_env.game.actions import KEY_FORCE_N
 from roller_env.level import Level, load_level, parse_level, shipped_levels
@@ -23,6 +24,7 @@ from roller_env.units import quants
 from tests.level.samples import SMALL, small_level
 from tests.level.test_docs import EXAMPLES, LEFT_OUT, completed
 from tests.replay.recording import wandered
+from tests.strategies import levels
 
 RADIUS = quants(16.0)
 PLATE = {"name": "plate", "at": (3.0, 0.0, 0.25), "size": (1.0, 1.0, 0.5), "sinks_to": 0.1}
@@ -221,6 +223,20 @@ def test_a_ball_that_is_driven_off_the_edge_was_within_reach_all_the_way_down(se
     found = reach(level, play())
     assert found is not None
     assert found.coins.all()
+
+
+@settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
+@given(levels())
+def test_every_valid_level_can_be_looked_at(level: Level) -> None:
+    for problem in lint(level, play(), "quant"):
+        assert problem.message
+        assert not problem.path or problem.path[0] in Level.model_fields
+
+
+def test_the_strangest_forces_do_no_harm() -> None:
+    pad = {"at": (9.0, 0.0, 0.02), "size": (1, 1, 0.04), "force_n": 1e6, "duration_s": 86_400.0}
+    ball = {"mass_kg": 0.001, "elasticity": 0.95}
+    assert fields(ball=ball, lift_pads=[pad], gravity=0.001) == [("boxes", 0)]
 
 
 def test_a_level_too_large_to_search_is_left_alone() -> None:
