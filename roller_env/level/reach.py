@@ -279,7 +279,7 @@ class _Flood:
             steepness = float(np.abs(solid.rotation[2]).max())
             across = steepness * (float(spans.under[on[index]]) + 2.0 * radius) - 2.0 * radius
             landing = Landing(float(drops[index]), steepness, across)
-            if landing.drop > found.get(solid.source, landing).drop or solid.source not in found:
+            if solid.source not in found or landing.drop > found[solid.source].drop:
                 found[solid.source] = landing
         return found
 
@@ -297,10 +297,10 @@ class _Flood:
         pads = [index for index in range(len(level.lift_pads)) if self._touches(index)]
         if pads:
             groups = pad_groups(level)
-            strongest = {groups[index]: 0.0 for index in pads}
+            strongest: dict[int, float] = {}
             for index in pads:
-                force = max(strongest[groups[index]], level.lift_pads[index].force_n)
-                strongest[groups[index]] = force
+                group, force = groups[index], level.lift_pads[index].force_n
+                strongest[group] = max(strongest.get(group, 0.0), force)
             net = sum(strongest.values()) / level.ball.mass_kg - gravity
             push_s = max(level.lift_pads[index].duration_s for index in pads)
             rests = high + 0.5 * net * push_s**2 + (net * push_s) ** 2 / (2.0 * gravity)
