@@ -38,8 +38,6 @@ MAX_PHYSICS_STEPS: Final = 2**22
 """Physics steps of a replay, since a file must not be able to ask for days of work: over an hour
 of the finest preset."""
 
-_MIN_PHYSICS_DT_S: Final = 1e-5
-_MAX_SOLVER_ITERATIONS: Final = 1000
 
 MAX_TEXT: Final = 200
 """Characters of a name in a replay."""
@@ -136,16 +134,6 @@ class Options(_Frozen):
 
     @model_validator(mode="after")
     def _can_be_played(self) -> Options:
-        preset = self.physics
-        if not _MIN_PHYSICS_DT_S <= preset.dt_s <= 1.0:
-            raise ValueError(f"physics.dt_s: found {preset.dt_s}; must be {_MIN_PHYSICS_DT_S} to 1")
-        if not 1 <= preset.iterations <= _MAX_SOLVER_ITERATIONS:
-            raise ValueError(
-                f"physics.iterations: found {preset.iterations}; must be 1 to "
-                f"{_MAX_SOLVER_ITERATIONS}"
-            )
-        if not (0.0 < preset.impratio < np.inf and 0.0 <= preset.tolerance < np.inf):
-            raise ValueError("physics: impratio and tolerance must be positive and finite")
         EnvConfig(**self.keywords())
         return self
 

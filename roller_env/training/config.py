@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -24,7 +23,6 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 
 from roller_env.config import MAX_ENVS, make_config
 from roller_env.envs.spaces import action_space, observation_space
-from roller_env.game.rewards import RewardWeights
 from roller_env.problems import Problem, listed
 from roller_env.training.config_source import ConfigError, ConfigSource
 
@@ -199,7 +197,7 @@ class TrainingConfig(_Frozen):
         if "level" in options:
             raise ValueError("level: is a field of the training itself; remove it here")
         try:
-            make_config(**_with_weights(options))
+            make_config(**options)
         except TypeError as error:  # an unknown option, which pydantic would let through
             raise ValueError(str(error)) from None
         return options
@@ -223,12 +221,12 @@ class TrainingConfig(_Frozen):
     @property
     def environment_options(self) -> dict[str, Any]:
         """The options of the training's environments; they discount as the learner does."""
-        return {"discount": self.ppo.gamma, **_with_weights(self.environment)}
+        return {"discount": self.ppo.gamma, **self.environment}
 
     @property
     def evaluation_options(self) -> dict[str, Any]:
         """The options of the evaluation's environments."""
-        return self.environment_options | _with_weights(self.evaluation_environment)
+        return {**self.environment_options, **self.evaluation_environment}
 
     @property
     def steps_per_update(self) -> int:
@@ -278,21 +276,6 @@ def load_config(file: str | os.PathLike[str], overrides: Sequence[str] = ()) -> 
     except ValidationError as error:
         problems = [_problem(details, source) for details in error.errors(include_url=False)]
         raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)) from None
-
-
-def _with_weights(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return environment options with the reward's weights as the environment takes them."""
-    weights = options.get("reward_weights")
-    if weights is None:
-        return dict(options)
-    known = tuple(field.name for field in fields(RewardWeights))
-    if not isinstance(weights, Mapping):
-        raise ValueError(f"reward_weights: expected any of {listed(known)}; found {weights!r}")
-    for name in weights:
-        if name not in known:
-            message = f"unknown weight {name!r}; known are {listed(known)}"
-            raise ValueError(str(Problem(("reward_weights",), message, written=name, known=known)))
-    return {**options, "reward_weights": RewardWeights(**weights)}
 
 
 def _problem(details: ErrorDetails, source: ConfigSource) -> Problem:

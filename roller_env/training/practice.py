@@ -147,13 +147,4 @@ def joined(games: Sequence[Snapshot]) -> Snapshot:
 
 def separate(games: Snapshot) -> list[Snapshot]:
     """Return a snapshot of many rows as snapshots of one row each."""
-    return [
-        replace(
-            games,
-            physics=games.physics[row : row + 1],
-            game={name: values[row : row + 1] for name, values in games.game.items()},
-            level_of_row=games.level_of_row[row : row + 1],
-            generators=games.generators[row : row + 1],
-        )
-        for row in range(len(games.generators))
-    ]
+    return [games.take([row]) for row in range(len(games))]

@@ -1,4 +1,4 @@
-"""How presets are chosen: the measures tell what is known, and the presets keep their promises."""
+"""How presets are chosen: the measures tell what is known, and presets meet the requirements."""
 
 from __future__ import annotations
 

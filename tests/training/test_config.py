@@ -12,6 +12,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from roller_env.config import make_config
 from roller_env.game.rewards import RewardWeights
 from roller_env.level import shipped_levels
 from roller_env.training.config import TrainingConfig, load_config
@@ -70,7 +71,8 @@ def test_the_evaluation_may_be_held_elsewhere_than_the_training() -> None:
 
 def test_reward_weights_are_given_by_name() -> None:
     config = small_config(environment={"reward_weights": {"coin": 2.0}})
-    assert config.environment_options["reward_weights"] == RewardWeights(coin=2.0)
+    made = make_config(level=config.level, **config.environment_options)
+    assert made.reward_weights == RewardWeights(coin=2.0)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +96,10 @@ def test_reward_weights_are_given_by_name() -> None:
             "environment.level: is a field of the training",
         ),
         ("level: flat\nenvironment: {reward_weights: {coins: 1}}", "did you mean 'coin'?"),
-        ("level: flat\nenvironment: {reward_weights: 3}", "reward_weights: expected any of 'coin'"),
+        (
+            "level: flat\nenvironment: {reward_weights: 3}",
+            "reward_weights: found 3; must be a RewardWeights or a mapping with its fields coin,",
+        ),
         ("level: flat\nenvironment: {reward: shapely}", "yaml:2:23: environment.reward: found"),
         ("level: flat\nseed: 1\nseed: 2", "yaml:3:1: seed: given twice, first on line 2"),
         ("level: flat\ntotal_steps: true", "2:14: total_steps: Input should be a valid integer"),

@@ -1,5 +1,5 @@
 """How fast the environments are: against physics alone, against other environments, and at scale.
 
-`ratios` races contestants side by side, `breakdown` says where the time goes, and `scale` how cost
+`ratios` runs cases side by side, `breakdown` says where the time goes, and `scale` how cost
 and memory grow.
 """

@@ -1,4 +1,4 @@
-"""The ratios that the project promises, measured, and how they stand to their goals."""
+"""The ratios that are required, measured, and how they stand to their goals."""
 
 from __future__ import annotations
 
