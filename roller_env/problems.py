@@ -59,12 +59,21 @@ class Problem:
         near = difflib.get_close_matches(self.written.lower(), lower, n=1, cutoff=0.6)
         return lower[near[0]] if near else None
 
-    def __str__(self) -> str:
+    @property
+    def where(self) -> str:
+        """The place as editors read it, ``file:line:column``, as far as there is one."""
         filename = None if self.filename is None else shown(self.filename)
         place = [filename, self.line, self.column]
-        where = ":".join(str(part) for part in place if part is not None)
-        said = ": ".join(part for part in (where, self.field, self.message) if part)
+        return ":".join(str(part) for part in place if part is not None)
+
+    @property
+    def what(self) -> str:
+        """Everything but the place."""
+        said = ": ".join(part for part in (self.field, self.message) if part)
         return said if self.nearest is None else f"{said} (did you mean '{self.nearest}'?)"
+
+    def __str__(self) -> str:
+        return ": ".join(part for part in (self.where, self.what) if part)
 
 
 class ProblemsError(ValueError):

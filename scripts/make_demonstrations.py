@@ -15,15 +15,16 @@ Examples::
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 from tqdm import tqdm
 
+from roller_env.assets import asset_directory
 from roller_env.config import EnvConfig, make_config
-from roller_env.level import Level, LevelError, levels_directory, load_level, shipped_levels
+from roller_env.level import Level, LevelError, load_level, shipped_levels
 from roller_env.problems import printable
 from roller_env.replay import (
     Replay,
@@ -44,7 +45,7 @@ class Arguments:
     levels: Annotated[tuple[str, ...], tyro.conf.Positional] = ()
     """Names or files of the levels; by default all that are shipped."""
 
-    output: Path = levels_directory().parent / "replays"
+    output: Path = field(default_factory=lambda: asset_directory("replays"))
     """Directory for them: LEVEL.replay, or LEVEL-NUMBER.replay if there are several."""
 
     rerecord: bool = False

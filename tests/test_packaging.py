@@ -75,19 +75,58 @@ def test_the_wheel_holds_every_level_and_replay_and_says_that_it_is_typed(wheel:
     assert "roller_env/py.typed" in names
     assert {f"roller_env/assets/levels/{level}.yaml" for level in shipped_levels()} <= names
     assert {f"roller_env/assets/replays/{level}.replay" for level in shipped_replays()} <= names
+    assert {f"roller_env/assets/configs/ppo_{level}.yaml" for level in shipped_levels()} <= names
+    assert "roller_env/assets/sounds/coin.wav" in names
     only_here = ("tests/", "scripts/", "configs/", "roller_env/lab/")
     assert not [name for name in names if name.startswith(only_here)]
 
 
-def test_the_installed_wheel_plays_in_another_directory(wheel: Path, tmp_path: Path) -> None:
-    environment = tmp_path / "environment"
-    run(sys.executable, "-m", "venv", "--without-pip", environment, directory=tmp_path)
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the programs of an environment in which the wheel is installed."""
+    environment = tmp_path_factory.mktemp("installed") / "environment"
+    run(sys.executable, "-m", "venv", "--without-pip", environment, directory=wheel.parent)
     python = environment / "bin" / "python"
     pip = (sys.executable, "-m", "pip", "--python", python, "install", "--quiet")
-    run(*pip, "--no-deps", "--no-index", wheel, directory=tmp_path)
+    run(*pip, "--no-deps", "--no-index", wheel, directory=wheel.parent)
     # The dependencies of this environment, but not its editable install of Roller: a .pth file
     # is obeyed in an environment's own directory only.
     version = f"python{sys.version_info.major}.{sys.version_info.minor}"
     site_packages = environment / "lib" / version / "site-packages"
     (site_packages / "dependencies.pth").write_text(sysconfig.get_path("purelib") + "\n")
-    assert run(python, "-c", PLAY, directory=tmp_path).startswith("ball at ")
+    return environment / "bin"
+
+
+def test_the_installed_wheel_plays_in_another_directory(installed: Path, tmp_path: Path) -> None:
+    assert run(installed / "python", "-c", PLAY, directory=tmp_path).startswith("ball at ")
+
+
+def test_the_installed_command_works_in_an_empty_directory(installed: Path, tmp_path: Path) -> None:
+    roller = installed / "roller"
+    assert "usage: roller COMMAND" in run(roller, "--help", directory=tmp_path)
+    run(roller, "level", "new", "mine.yaml", directory=tmp_path)
+    assert run(roller, "level", "check", "mine.yaml", "flat", directory=tmp_path) == ""
+    program = (
+        "from roller_env.assets import asset_directory as a; from roller_env.replay import *; "
+        "from roller_env.cli.train import config_file; "
+        "print(load_replay(shipped_replays()['flat']).level.name, config_file('gate', None).name, "
+        "(a('sounds') / 'coin.wav').stat().st_size > 0)"
+    )
+    found = run(installed / "python", "-c", program, directory=tmp_path)
+    assert found == "flat ppo_gate.yaml True\n"
+
+
+def test_the_installed_command_trains_a_shipped_configuration(
+    installed: Path, tmp_path: Path
+) -> None:
+    faulty = subprocess.run(
+        [installed / "roller", "train", "classic", "--set", "num_envs=0"],
+        cwd=tmp_path,
+        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert faulty.returncode == 1
+    assert faulty.stderr.startswith("error: --set 'num_envs=0': num_envs: ")
+    assert list(tmp_path.iterdir()) == []

@@ -17,7 +17,8 @@ import numpy.typing as npt
 
 from roller_env.game.compiled import compiled
 from roller_env.game.state import GameState
-from roller_env.game.tables import COIN_REACH_M, Kind, LevelTable
+from roller_env.game.tables import Kind, LevelTable
+from roller_env.level.schema import COIN_REACH_M
 
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]

@@ -19,14 +19,10 @@ import numpy.typing as npt
 from roller_env.game.cameras import TriggerKind
 from roller_env.level.expand import coin_positions, pad_groups
 from roller_env.level.schema import PLATE_HIT_HEIGHT_M, Level
-from roller_env.units import quants
 
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
 Int64 = npt.NDArray[np.int64]
-
-COIN_REACH_M: Final = quants(30.0)
-"""A coin is collected when the ball's centre is this near to it (`collect`)."""
 
 TOUCH_TOLERANCE_M: Final = 1e-4
 """Soft contacts hold surfaces this near to each other; nearer counts as touching."""

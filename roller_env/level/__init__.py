@@ -6,6 +6,8 @@ from roller_env.level.check import check_level
 from roller_env.level.doubts import level_warnings
 from roller_env.level.errors import LevelError, LevelWarning
 from roller_env.level.load import (
+    examine_level,
+    is_path,
     level_json_schema,
     levels_directory,
     load_level,
@@ -21,6 +23,8 @@ __all__ = [
     "LevelWarning",
     "Problem",
     "check_level",
+    "examine_level",
+    "is_path",
     "level_json_schema",
     "level_warnings",
     "levels_directory",

@@ -20,10 +20,13 @@ from pydantic import ValidationError
 from pydantic.json_schema import GenerateJsonSchema
 from pydantic_core import CoreSchema
 
+from roller_env.assets import asset_directory
 from roller_env.level.check import check_level
 from roller_env.level.doubts import level_warnings
 from roller_env.level.errors import LevelError, LevelWarning
+from roller_env.level.lint import lint
 from roller_env.level.messages import explain
+from roller_env.level.reach import Play
 from roller_env.level.schema import METRES_PER_UNIT, SCALE_KEY, Level
 from roller_env.level.words import Unit
 from roller_env.problems import Problem, listed, quoted
@@ -55,12 +58,38 @@ def load_level(source: str | os.PathLike[str] | Level | Mapping[str, Any]) -> Le
         return source
     if isinstance(source, Mapping):
         try:
-            return _level(_tree(lambda: plain_tree(source)), "", "", stacklevel=4)
+            level, doubts = _examined(_tree(lambda: plain_tree(source)), "", "")
         except LevelError as error:
             raise LevelError(map(_without_a_place, error.problems)) from None
-    is_name = isinstance(source, str) and not is_path(source)
-    path = _shipped_path(str(source)) if is_name else Path(source)
-    return _parse(_decoded(_read(path), str(path)), str(path), stacklevel=4)
+        _warn(map(_without_a_place, doubts), stacklevel=3)
+        return level
+    path = _path_of(source)
+    filename, text = str(path), _decoded(_read(path), str(path))
+    level, doubts = _examined(_tree(lambda: read_tree(text, filename)), text, filename)
+    _warn(doubts, stacklevel=3)
+    return level
+
+
+def examine_level(source: str | os.PathLike[str], play: Play) -> tuple[Level, tuple[Problem, ...]]:
+    """Load and check a level, and look long for what a designer hardly meant.
+
+    Args:
+        source: the name of a shipped level, or a path, as for `load_level`.
+        play: how it is to be played.
+
+    Returns:
+        The level, and the warnings in the order of the file: those that `load_level` shows, and
+        those of `roller_env.level.lint`.
+
+    Raises:
+        LevelError: it cannot be played.
+    """
+    path = _path_of(source)
+    filename, text = str(path), _decoded(_read(path), str(path))
+    root = _tree(lambda: read_tree(text, filename))
+    level, doubts = _examined(root, text, filename)
+    found = (_placed(problem, root, filename) for problem in lint(level, play, _unit(root)))
+    return level, tuple(_in_file_order((*doubts, *found)))
 
 
 def is_path(source: str) -> bool:
@@ -82,11 +111,9 @@ def parse_level(text: str, filename: str = "<text>") -> Level:
     Raises:
         LevelError: the level has problems; all of them are in ``problems``.
     """
-    return _parse(text, filename, stacklevel=4)
-
-
-def _parse(text: str, filename: str, stacklevel: int) -> Level:
-    return _level(_tree(lambda: read_tree(text, filename)), text, filename, stacklevel + 1)
+    level, doubts = _examined(_tree(lambda: read_tree(text, filename)), text, filename)
+    _warn(doubts, stacklevel=3)
+    return level
 
 
 def _tree(read: Callable[[], Node]) -> Node:
@@ -97,16 +124,15 @@ def _tree(read: Callable[[], Node]) -> Node:
         raise LevelError(error.problems) from None
 
 
-def _level(root: Node, text: str, filename: str, stacklevel: int) -> Level:
-    """Return the level that a tree says, if it is right in shape and in meaning."""
+def _examined(root: Node, text: str, filename: str) -> tuple[Level, list[Problem]]:
+    """Return the level that a tree says, if it is right in shape and in meaning, and its doubts."""
     unit = _unit(root)
     try:
         level = Level.model_validate(root.plain(), context={SCALE_KEY: METRES_PER_UNIT[unit]})
     except ValidationError as error:
         raise LevelError(_in_file_order(explain(error, root, text, filename))) from None
     _refuse(_placed(problem, root, filename) for problem in check_level(level, unit))
-    _warn((_placed(doubt, root, filename) for doubt in level_warnings(level, unit)), stacklevel)
-    return level
+    return level, [_placed(doubt, root, filename) for doubt in level_warnings(level, unit)]
 
 
 def shipped_levels() -> tuple[str, ...]:
@@ -117,17 +143,10 @@ def shipped_levels() -> tuple[str, ...]:
 def levels_directory() -> Path:
     """Return the directory of the shipped levels.
 
-    It is inside the package in an installed wheel, and beside the package in a checkout.
-
     Raises:
         FileNotFoundError: the installation has lost it.
     """
-    package = Path(__file__).resolve().parents[1]
-    places = (package / "assets" / "levels", package.parent / "assets" / "levels")
-    for place in places:
-        if place.is_dir():
-            return place
-    raise FileNotFoundError(f"no directory of levels; looked for {listed([*map(str, places)])}")
+    return asset_directory("levels")
 
 
 class _EditorSchema(GenerateJsonSchema):
@@ -160,6 +179,11 @@ def _draft_07(schema: Any) -> Any:
         said["items"], *others = said.pop("prefixItems")
         assert all(other == said["items"] for other in others), "a list of unlike items"
     return said
+
+
+def _path_of(source: str | os.PathLike[str]) -> Path:
+    is_name = isinstance(source, str) and not is_path(source)
+    return _shipped_path(str(source)) if is_name else Path(source)
 
 
 def _shipped_path(name: str) -> Path:

@@ -46,6 +46,9 @@ PLATE_HIT_HEIGHT_M: Final = quants(25.0)
 """A plate counts a hit only while the ball's centre is higher than this over its ``at``: the
 original's guard against hits from the side."""
 
+COIN_REACH_M: Final = quants(30.0)
+"""A coin is collected when the ball's centre is this near to it (`collect`)."""
+
 MAX_COINS: Final = 10_000
 MAX_PIECES: Final = 20_000
 MAX_PLAN_CELLS: Final = 40_000

@@ -7,19 +7,14 @@ nothing is heard. Without pygame (the extra ``sound``) or without a sound card t
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Any, Final
+
+from roller_env.assets import asset_directory
 
 COIN: Final = "coin.wav"
 SAMPLE_RATE_HZ: Final = 44_100
 BUFFER_SAMPLES: Final = 512
 """A sound is at most this much late: 12 ms."""
-
-
-def sounds_directory() -> Path:
-    """Return where the sounds lie: in the installed package, or in the source tree."""
-    inside = Path(__file__).parents[1] / "assets" / "sounds"
-    return inside if inside.is_dir() else Path(__file__).parents[2] / "assets" / "sounds"
 
 
 class CoinSound:
@@ -49,5 +44,5 @@ class CoinSound:
             pygame.mixer.init(frequency=SAMPLE_RATE_HZ, channels=1, buffer=BUFFER_SAMPLES)
         except pygame.error as error:
             return f"there is no sound card to play on: {error}"
-        self._sound = pygame.mixer.Sound(str(sounds_directory() / COIN))
+        self._sound = pygame.mixer.Sound(str(asset_directory("sounds") / COIN))
         return None

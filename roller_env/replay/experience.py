@@ -160,5 +160,5 @@ def _compare(simulation: Simulation, replays: list[Replay], step: int) -> None:
         raise ReplayError(
             f"{len(others)} of {len(replays)} replays of level {simulation.compiled.level.name!r} "
             f"are other games at step {step}, in {', '.join(others[0])}: they were recorded with "
-            "other versions, which scripts/replay.py names"
+            "other versions, which 'roller replay' names"
         )

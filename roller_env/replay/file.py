@@ -27,7 +27,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import from_json
 
-from roller_env.level import Level, LevelError, levels_directory, load_level
+from roller_env.assets import asset_directory
+from roller_env.level import Level, LevelError, load_level
 from roller_env.regular_files import read_regular_file
 from roller_env.replay.actions import (
     ACTION_BYTES,
@@ -171,8 +172,8 @@ def read_whole(path: Path) -> bytes:
 
 def shipped_replays() -> dict[str, Path]:
     """Return the files of the demonstrations that come with the package, by level."""
-    directory = levels_directory().parent / "replays"
-    return {path.stem: path for path in sorted(directory.glob(f"*{SUFFIX}"))}
+    files = sorted(asset_directory("replays").glob(f"*{SUFFIX}"))
+    return {path.stem: path for path in files}
 
 
 def encode(replay: Replay) -> bytes:
@@ -304,7 +305,7 @@ def _kind_of(found: Any, kinds: Sequence[type[Header]]) -> type[Header]:
         # True is equal to 1.
         if found == kind.model_fields["format"].default and not isinstance(found, bool):
             return kind
-    hint = "; scripts/replay.py FILE --convert NEW makes a new file of it" if found == 1 else ""
+    hint = "; roller replay FILE --convert NEW makes a new file of it" if found == 1 else ""
     raise ReplayError(
         f"found format {str(found)[:20]}; this version of Roller plays format "
         f"{FORMAT_VERSION}{hint}"

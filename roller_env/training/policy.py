@@ -163,7 +163,7 @@ def load_policy(run: str | os.PathLike[str], *, trust: bool = False) -> TrainedP
     if not files.directory.is_dir():
         raise RunError(f"{name}: there is no such directory; a run's has a policy.json")
     if not (files.sb3_policy.exists() and files.sb3_normaliser.exists()):
-        raise RunError(f"{name} has no policy.json; 'scripts/train.py --resume' finishes a run")
+        raise RunError(f"{name} has no policy.json; 'roller train --resume' finishes a run")
     if not trust:
         raise RunError(
             f"{name} has no policy.json, only Stable-Baselines3's policy.zip and "

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roller_env.play.sound import COIN, SAMPLE_RATE_HZ, CoinSound, sounds_directory
+from roller_env.assets import asset_directory
+from roller_env.play.sound import COIN, SAMPLE_RATE_HZ, CoinSound
 from scripts import make_sounds
 from tests.patience import STALLED_S
 
@@ -24,13 +25,13 @@ def samples(path: Path) -> np.ndarray:
 
 def test_the_shipped_sound_is_what_the_script_makes(tmp_path: Path) -> None:
     make_sounds.main(make_sounds.Arguments(output=tmp_path))
-    made, shipped = samples(tmp_path / COIN), samples(sounds_directory() / COIN)
+    made, shipped = samples(tmp_path / COIN), samples(asset_directory("sounds") / COIN)
     # Sines differ in the last bit from one C library to another.
     assert made == pytest.approx(shipped, abs=2 / 32768)
 
 
 def test_the_sound_is_short_clean_and_rings_on_its_two_notes() -> None:
-    sound = samples(sounds_directory() / COIN)
+    sound = samples(asset_directory("sounds") / COIN)
     assert 0.2 < len(sound) / SAMPLE_RATE_HZ < 0.6
     assert 0.2 < np.abs(sound).max() < 0.9
     assert abs(sound[0]) < 0.01
@@ -93,5 +94,5 @@ def test_with_a_sound_card_the_sound_goes_to_it(tmp_path: Path) -> None:
     assert result.stdout.strip() == "None", result.stderr
     heard = np.frombuffer(played.read_bytes(), "<i2") / 32768.0
     assert np.abs(heard).max() == pytest.approx(
-        np.abs(samples(sounds_directory() / COIN)).max(), rel=0.05
+        np.abs(samples(asset_directory("sounds") / COIN)).max(), rel=0.05
     )

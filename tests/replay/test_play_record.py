@@ -11,9 +11,9 @@ from typing import Any
 
 import pytest
 
+from roller_env.cli import play
 from roller_env.replay import load_replay, verify
 from roller_env.replay.keeper import ReplayKeeper
-from scripts import play
 from tests.replay.recording import pushed_otherwise, wandered
 
 minari = pytest.importorskip("minari", reason="the extra 'demos' is not installed")
@@ -91,7 +91,7 @@ def test_what_fails_while_it_is_played_costs_nothing_of_what_was_played(
     monkeypatch.setattr(play, "open_page", lambda *_, **__: None)
     monkeypatch.setattr(play, "run", run)
     with pytest.raises(RuntimeError, match="the page is gone"):
-        play.main(
+        play.play(
             play.Arguments(level="flat", skip_intro=True, mute=True, record="roller/human", port=0)
         )
     assert minari.load_dataset("roller/human/flat-v0").total_episodes == 1

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from roller_env.cli.replay import about
 from roller_env.replay import load_replay, save_replay, shipped_replays, verify
-from scripts.replay import _about as about
 from tests.replay.recording import pushed_otherwise, same, wandered
 from tests.replay.test_conversion import of_format_1
 

@@ -1,0 +1,333 @@
+"""Check, draw and begin levels, and watch one while it is written.
+
+Where a LEVEL is asked for, the name of one that comes with Roller will do, or a level file.
+
+Examples::
+
+    roller level new mine.yaml
+    roller level watch mine.yaml
+    roller level check *.yaml
+    roller level draw mine.yaml --view overview -o mine.png
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+import tyro
+
+from roller_env.game.actions import KEY_FORCE_N
+from roller_env.level import (
+    Level,
+    LevelError,
+    examine_level,
+    level_json_schema,
+    levels_directory,
+    load_level,
+    parse_level,
+)
+from roller_env.level.reach import Play
+from roller_env.level.template import new_level
+from roller_env.physics.presets import physics_preset
+from roller_env.problems import Problem, printable, shown
+
+Preset = Literal["fast", "default", "accurate"]
+"""The names of `PRESETS`; a test holds the two together."""
+View = Literal["plan", "overview"]
+Output = Annotated[Path | None, tyro.conf.arg(aliases=["-o"])]
+
+OVERVIEW_SIZE: Final = (1280, 800)
+"""Width and height in pixels."""
+
+PICTURES: Final = (".png", ".jpg", ".jpeg", ".webp")
+
+_LOOK_EVERY_S: Final = 0.3
+
+
+class CommandError(Exception):
+    """What was asked for cannot be done; the text says why."""
+
+
+def main(argv: Sequence[str] | None = None, prog: str | None = None) -> int:
+    """Do what the command line says; return the exit status.
+
+    Args:
+        argv: the words after the command; by default those of this process.
+        prog: what the help calls the command.
+    """
+    return _told(
+        lambda: tyro.extras.subcommand_cli_from_dict(
+            COMMANDS, args=argv, prog=prog, description=__doc__
+        )
+    )
+
+
+def mjcf_main() -> int:
+    """Do what ``scripts/compile_level.py`` is asked; return the exit status."""
+    return _told(lambda: tyro.cli(mjcf))
+
+
+def export_main() -> int:
+    """Do what ``scripts/export_schema.py`` is asked; return the exit status.
+
+    Without an output it writes to where the package keeps the schema.
+    """
+    return _told(lambda: tyro.cli(_export))
+
+
+def _told(command: Callable[[], int]) -> int:
+    """Return a command's exit status, and say why if it could not be carried out."""
+    try:
+        return command()
+    except LevelError as error:
+        print(printable(error), file=sys.stderr)
+    except CommandError as error:
+        print(f"error: {printable(error)}", file=sys.stderr)
+    except OSError as error:
+        print(f"error: {shown(error.filename)}: {error.strerror}", file=sys.stderr)
+    return 1
+
+
+def check(
+    files: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="LEVEL")],
+    physics: Preset = "default",
+    strict: bool = False,
+) -> int:
+    """Say everything that is wrong with levels, as file:line:column: error or warning: what.
+
+    The exit status is 1 if a level cannot be played.
+
+    Args:
+        files: names of levels, or level files.
+        physics: physics preset that the floors must be thick enough for.
+        strict: have a warning count as an error.
+    """
+    if not files:
+        raise CommandError("no level is named; say which to check")
+    errors = warnings = 0
+    for file in files:
+        level_errors, level_warnings = _report(file, physics)
+        errors, warnings = errors + level_errors, warnings + level_warnings
+    levels = f"{len(files)} level{'' if len(files) == 1 else 's'}"
+    print(f"{levels}: {_number(errors, 'error')}, {_number(warnings, 'warning')}", file=sys.stderr)
+    return 1 if errors or (strict and warnings) else 0
+
+
+def _report(source: str, physics: Preset) -> tuple[int, int]:
+    """Print what is wrong with a level; return how many errors and warnings that were."""
+    try:
+        _, warnings = examine_level(source, _play(physics))
+    except LevelError as error:
+        for problem in error.problems:
+            print(_line(problem, "error"))
+        return len(error.problems), 0
+    for problem in warnings:
+        print(_line(problem, "warning"))
+    return 0, len(warnings)
+
+
+def _play(physics: Preset) -> Play:
+    # The hardest push is that of two keys.
+    return Play(
+        dt_s=physics_preset(physics).dt_s,
+        push_n=math.hypot(KEY_FORCE_N, KEY_FORCE_N),
+    )
+
+
+def _line(problem: Problem, kind: str) -> str:
+    return printable(": ".join(part for part in (problem.where, kind, problem.what) if part))
+
+
+def _number(count: int, thing: str) -> str:
+    return f"{count} {thing}{'' if count == 1 else 's'}"
+
+
+def draw(
+    level: Annotated[str, tyro.conf.Positional], output: Output = None, view: View = "plan"
+) -> int:
+    """Draw a level: a map from above, or a picture of all of it as on its box.
+
+    Args:
+        level: name of a level, or a level file.
+        output: picture to write; by default the level's name and .png, in this directory.
+        view: plan needs no OpenGL, overview does.
+    """
+    loaded = load_level(level)
+    file = output or Path(f"{loaded.name}.png")
+    _check_picture(file)
+    _draw(loaded, file, view)
+    print(f"wrote {shown(file)}")
+    return 0
+
+
+def _check_picture(file: Path) -> None:
+    if file.suffix.lower() not in PICTURES:
+        raise CommandError(f"{file}: the name must end in {' or '.join(PICTURES)}")
+
+
+def _draw(level: Level, file: Path, view: View) -> None:
+    # Imported here: checking a level needs neither matplotlib nor MuJoCo.
+    if view == "plan":
+        from roller_env.drawing.topdown import draw_paths
+
+        draw_paths(level, [], [], file)
+        return
+    from PIL import Image
+
+    from roller_env.drawing.opengl import DrawingUnavailable
+    from roller_env.drawing.overview import render_overview
+
+    try:
+        picture = render_overview(level, *OVERVIEW_SIZE)
+    except DrawingUnavailable as error:
+        raise CommandError(str(error)) from None
+    file.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(picture).save(file)
+
+
+def new(file: Annotated[Path, tyro.conf.Positional]) -> int:
+    """Write a small level with comments, to begin with.
+
+    Args:
+        file: level file to write; there must be none of this name.
+    """
+    if file.suffix not in (".yaml", ".yml"):
+        raise CommandError(f"{file}: the name of a level file must end in .yaml")
+    text = new_level(file.stem)
+    parse_level(text, str(file))  # the file's name is the level's, if it can be one
+    try:
+        with file.open("x", encoding="utf-8") as opened:
+            opened.write(text)
+    except FileExistsError:
+        raise CommandError(f"{file}: there is such a file, which is not overwritten") from None
+    print(f"wrote {shown(file)}; 'roller level watch {shown(file)}' shows it while you edit it")
+    return 0
+
+
+def schema(output: Output = None) -> int:
+    """Write the JSON Schema of level files, from which editors complete and check them.
+
+    Args:
+        output: file to write; by default it is printed.
+    """
+    return _write(json.dumps(level_json_schema(), indent=2), output)
+
+
+def _export(output: Output = None) -> int:
+    """Write the JSON Schema of level files, from which editors complete and check them.
+
+    Run it after changing ``roller_env.level.schema``; a test fails while the written file is out of
+    date.
+
+    Args:
+        output: file to write; by default where the package keeps it.
+    """
+    return schema(output or levels_directory() / "level.schema.json")
+
+
+def mjcf(
+    level: Annotated[str, tyro.conf.Positional],
+    output: Output = None,
+    physics: Preset = "default",
+) -> int:
+    """Write a level as MJCF text that MuJoCo loads without this package.
+
+    Args:
+        level: name of a level, or a level file.
+        output: file to write; by default it is printed.
+        physics: physics preset of the model.
+    """
+    loaded = load_level(level)
+    # Imported here: the other commands need no MuJoCo.
+    from roller_env.compile.compiled import level_mjcf
+
+    return _write(level_mjcf(loaded, physics), output)
+
+
+def _write(text: str, output: Path | None) -> int:
+    if output is None:
+        print(text)
+    else:
+        output.write_text(text if text.endswith("\n") else f"{text}\n", encoding="utf-8")
+        print(f"wrote {shown(output)}")
+    return 0
+
+
+def watch(
+    file: Annotated[Path, tyro.conf.Positional],
+    output: Output = None,
+    view: View = "plan",
+    physics: Preset = "default",
+) -> int:
+    """Check a level and draw it anew on every save, until Ctrl-C.
+
+    A picture viewer that notices when its file changes shows the level beside the editor.
+
+    Args:
+        file: level file.
+        output: picture to write; by default beside the file, with its name and .png.
+        view: plan needs no OpenGL, overview does.
+        physics: physics preset that the floors must be thick enough for.
+    """
+    picture = output or file.with_suffix(".png")
+    _check_picture(picture)
+    try:
+        for _ in saves(file):
+            look(file, picture, view, physics)
+    except KeyboardInterrupt:
+        print()
+    return 0
+
+
+def look(file: Path, picture: Path, view: View, physics: Preset) -> None:
+    """Check a level file and, if it can be played, draw it."""
+    print(time.strftime("%H:%M:%S"), end=" ")
+    try:
+        level, warnings = examine_level(file, _play(physics))
+    except LevelError as error:
+        print(_number(len(error.problems), "error"))
+        print("\n".join(_line(problem, "error") for problem in error.problems), flush=True)
+        return
+    _draw(level, picture, view)
+    print(f"wrote {shown(picture)}, {_number(len(warnings), 'warning')}")
+    print("".join(f"{_line(problem, 'warning')}\n" for problem in warnings), end="", flush=True)
+
+
+def saves(file: Path, every_s: float = _LOOK_EVERY_S) -> Iterator[None]:
+    """Yield at once, and then whenever a file has been saved; never ends.
+
+    An editor may write the file in place or put another in its place; while there is none, nothing
+    was saved.
+    """
+    before: tuple[int, ...] | None = ()
+    while True:
+        now = _signature(file)
+        if now != before and (now is not None or before == ()):
+            before = now
+            yield
+        time.sleep(every_s)
+
+
+def _signature(file: Path) -> tuple[int, ...] | None:
+    try:
+        found = file.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size, found.st_ino
+
+
+COMMANDS: Final[dict[str, Callable[..., int]]] = {
+    "check": check,
+    "draw": draw,
+    "new": new,
+    "watch": watch,
+    "schema": schema,
+    "mjcf": mjcf,
+}
+"""By name."""

@@ -1,0 +1,194 @@
+"""Play the game in a browser page, in a window, or watch a trained agent play.
+
+Examples::
+
+    roller play
+    roller play bridge --skip-intro
+    roller play --policy runs/ppo_classic-seed0
+    roller play my_level.yaml --physics accurate --viewer native
+"""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Final, Literal
+
+import tyro
+
+from roller_env.config import EnvConfig
+from roller_env.play.app import GamePlugin, ScreenPlugin, level_choices
+from roller_env.play.scene import Quality
+from roller_env.play.server import (
+    DEFAULT_PORT,
+    LOOPBACK,
+    NATIVE_NOTE,
+    check_address,
+    open_page,
+    open_window,
+    run,
+    warning_of,
+)
+from roller_env.play.session import GameSession, Player, play_config
+from roller_env.play.sound import CoinSound
+from roller_env.problems import printable
+from roller_env.replay import datasets
+from roller_env.replay.keeper import ReplayKeeper
+
+RECORDED: Final = Path("replays")
+"""Where games are kept that are to become data sets, if nothing else is asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """Play the game, or watch a trained agent play it."""
+
+    game: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="LEVEL")] = None
+    """Name of a level, or path of a level file; by default classic, or the agent's own."""
+
+    level: str | None = None
+    """The same."""
+
+    port: int = DEFAULT_PORT
+    """Where the page is served; 0 takes the first free port from 8080."""
+
+    host: str = LOOPBACK
+    """Address to listen on. By default only this machine reaches the page."""
+
+    viewer: Literal["web", "native"] = "web"
+    """A page in the browser, or a window (Python 3.12 or newer)."""
+
+    quality: Quality = "high"
+    """low is for machines that draw without a graphics processor."""
+
+    physics: str | None = None
+    """fast, default or accurate; by default default, or that of the agent's evaluation."""
+
+    skip_intro: bool = False
+    """Let the keys work at once, not six seconds after the start."""
+
+    seed: int | None = None
+    """Of the first game; by default another one every time."""
+
+    policy: Path | None = None
+    """A run's directory: its agent plays until you press a key."""
+
+    trust: bool = False
+    """Also play an agent that is kept as pickles, as Stable-Baselines3 saves it. A pickle runs any
+    program its maker put into it: only for runs of people you trust."""
+
+    replays: Path | None = None
+    """Directory for a replay of every game; 'roller replay' verifies, shows and films them."""
+
+    record: str | None = None
+    """Prefix of Minari data sets of what was played, one a level, such as roller/human. Every game
+    is kept as a replay too, without --replays in the directory replays."""
+
+    mute: bool = False
+    """No sound."""
+
+
+def main(argv: Sequence[str] | None = None, prog: str | None = None) -> int:
+    """Do what the command line says; return the exit status, 1 if something was not written.
+
+    Args:
+        argv: the words after the command; by default those of this process.
+        prog: what the help calls the command.
+    """
+    try:
+        return play(tyro.cli(Arguments, args=argv, prog=prog, description=__doc__))
+    except (RuntimeError, ValueError) as error:
+        sys.exit(f"error: {printable(error)}")
+
+
+def play(arguments: Arguments) -> int:
+    """Play what the arguments say; return the exit status, 1 if something was not written."""
+    if arguments.game is not None:
+        if arguments.level is not None:
+            raise ValueError("level: found it twice; give it once, with --level or without")
+        arguments = replace(arguments, level=arguments.game)
+    directory = arguments.replays
+    if arguments.record is not None:
+        datasets.check_prefix(arguments.record)
+        # The data sets are written at the end, and what is killed before has none.
+        directory = directory or RECORDED
+    if arguments.viewer == "web":
+        check_address(arguments.host, arguments.port)
+    # When its terminal is closed, the game still writes what was recorded.
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
+    config, agent = game_of(arguments)
+    keeper = ReplayKeeper(directory, "human" if agent is None else "agent and human")
+    choices = level_choices(config.level)
+    sound = CoinSound(muted=arguments.mute)
+    if sound.silent_because and not arguments.mute:
+        print(f"no sound: {sound.silent_because}")
+    sessions = session_maker(config, agent, arguments, keeper)
+    game = GamePlugin(sessions, choices, sound, arguments.quality)
+    plugins = (game, ScreenPlugin(choices))
+    if arguments.viewer == "native":
+        handle = open_window(plugins)
+        print(NATIVE_NOTE)
+    else:
+        if warning := warning_of(arguments.host):
+            print(warning, file=sys.stderr)
+        handle = open_page(plugins, port=arguments.port, host=arguments.host)
+    try:
+        run(handle)
+    finally:
+        status = write_record(keeper, arguments.record)
+    return status
+
+
+def write_record(keeper: ReplayKeeper, record: str | None) -> int:
+    """Write the data sets that were asked for, and say where all is; return the exit status."""
+    lines = [f"replay: {file}" for file in keeper.files]
+    problems: tuple[str, ...] = ()
+    if record is not None:
+        # Whoever closes the terminal or shuts the machine down asks more than once.
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_IGN)
+        written = datasets.to_minari_by_level(keeper.replays, record)
+        lines += [f"data set: {name}" for name in written.names]
+        problems = written.problems
+        if not (written.names or problems):
+            lines.append("no data set: nothing was played with keys that worked")
+    # Last, since there may be no terminal any more.
+    for line in lines:
+        print(line, flush=True)
+    for problem in problems:
+        print(f"error: {problem}", file=sys.stderr)
+    return 1 if problems else 0
+
+
+def game_of(arguments: Arguments) -> tuple[EnvConfig, Player | None]:
+    """Return the options of the game, and the agent that plays it, if one does."""
+    if arguments.policy is None:
+        physics = arguments.physics or "default"
+        return play_config(arguments.level or "classic", physics), None
+    # Imported here: it takes torch, which a person's game does not need.
+    from roller_env.play.autopilot import load_autopilot
+
+    return load_autopilot(
+        arguments.policy, arguments.level, arguments.physics, trust=arguments.trust
+    )
+
+
+def session_maker(
+    config: EnvConfig, agent: Player | None, arguments: Arguments, keeper: ReplayKeeper
+) -> Callable[[str], GameSession]:
+    """Return what makes the game of a level."""
+
+    def make(level: str) -> GameSession:
+        return GameSession(
+            replace(config, level=level),
+            skip_intro=arguments.skip_intro,
+            seed=arguments.seed,
+            agent=agent,
+            observers=(keeper,),
+        )
+
+    return make

@@ -1,0 +1,143 @@
+"""Train an agent, evaluate it and draw what it does.
+
+Examples::
+
+    roller train classic --seed 1
+    roller train classic --seed 1 --resume
+    roller train classic --demos demonstrations --name taught
+    roller train gate --set ppo.gamma=0.995 --name far-sighted
+    roller train mine.yaml
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Final
+
+import tyro
+
+from roller_env.assets import asset_directory
+from roller_env.level import LevelError, is_path
+from roller_env.problems import Problem, listed, printable, quoted, shown
+from roller_env.training import ConfigError, TrainingRun, load_config, train
+from roller_env.training.checkpoint import CheckpointError
+from roller_env.training.demonstrations import DemonstrationError
+from roller_env.training.files import RunError, run_directory
+
+DEFAULT: Final = "classic"
+"""What is trained if nothing else is asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """Train an agent, evaluate it and draw what it does; all of it goes into runs/<name>/."""
+
+    what: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="NAME|FILE")] = None
+    """What to train, and how: a configuration that comes with Roller, such as classic, or a file
+    of your own; by default classic."""
+
+    config: Path | None = None
+    """The same, always a file."""
+
+    name: str | None = None
+    """The run's; by default the name of the configuration's file and the seed."""
+
+    seed: int | None = None
+    """Instead of the configuration's."""
+
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FIELD=VALUE")] = ()
+    """Other values than the configuration's, such as num_envs=64 ppo.gamma=0.995."""
+
+    demos: str | None = None
+    """Replays, or a Minari data set, that the policy learns to imitate before its first step."""
+
+    resume: bool = False
+    """Go on with a run that was stopped, even by a kill; says where the results are if none was."""
+
+    runs: Path = Path("runs")
+    """Directory of all runs."""
+
+
+def main(argv: Sequence[str] | None = None, prog: str | None = None) -> None:
+    """Do what the command line says.
+
+    Args:
+        argv: the words after the command; by default those of this process.
+        prog: what the help calls the command.
+    """
+    try:
+        _train(tyro.cli(Arguments, args=argv, prog=prog, description=__doc__))
+    except (ConfigError, RunError, CheckpointError, DemonstrationError, LevelError) as error:
+        sys.exit(f"error: {printable(error)}")
+    except KeyboardInterrupt:
+        sys.exit("\nstopped; --resume goes on from the last checkpoint")
+
+
+def shipped_configs() -> dict[str, Path]:
+    """Return the files of the configurations that come with the package, by level."""
+    files = sorted(asset_directory("configs").glob("*.yaml"))
+    return {path.stem.partition("_")[2]: path for path in files}
+
+
+def config_file(what: str | None, config: Path | None) -> Path:
+    """Return the file that the command line asks for.
+
+    Raises:
+        ConfigError: it asks for two, or for a name that there is not.
+    """
+    if config is not None:
+        if what is not None:
+            message = f"found both {quoted(what)} and --config; give one of the two"
+            raise ConfigError([Problem((), message)])
+        return config
+    what = what or DEFAULT
+    if is_path(what):
+        return Path(what)
+    shipped = shipped_configs()
+    if what not in shipped:
+        known = tuple(shipped)
+        message = f"no configuration is called {quoted(what)}; there are {listed(known)}"
+        problem = Problem((), f"{message}, and paths end in .yaml", written=what, known=known)
+        raise ConfigError([problem])
+    return shipped[what]
+
+
+def _train(arguments: Arguments) -> None:
+    file = config_file(arguments.what, arguments.config)
+    seed = () if arguments.seed is None else (f"seed={arguments.seed}",)
+    demos = () if arguments.demos is None else (f"demonstrations={json.dumps(arguments.demos)}",)
+    config = load_config(file, (*arguments.set, *seed, *demos))
+    default = f"{file.stem}-seed{config.seed}"
+    name = default if arguments.name is None else arguments.name
+    directory = run_directory(arguments.runs, name)
+    algorithm, level = config.algorithm.upper(), shown(config.level)
+    print(f"Training {algorithm} on {level}, seed {config.seed}: {shown(directory)}")
+    print_results(train(config, directory, resume=arguments.resume))
+
+
+def print_results(run: TrainingRun) -> None:
+    """Say where everything is."""
+    if run.was_finished:
+        print(f"{shown(run.files.directory)} is finished already; remove it to train it anew.")
+        print(run.files.evaluation_table.read_text())
+    files = run.files
+    results = {
+        "policy": files.policy,
+        "its weights": files.weights,
+        "the same for SB3": files.sb3_policy,
+        "training log": files.progress,
+        "TensorBoard": files.tensorboard,
+        "learning curve": files.learning_curve,
+        "evaluation": files.evaluation_table,
+        "episodes": files.episodes,
+        "paths from above": files.paths,
+        # A GIF where there is no ffmpeg.
+        "video": next(files.directory.glob(f"{files.video.stem}.*"), files.video),
+        "all about the run": files.summary,
+    }
+    for title, path in results.items():
+        print(f"  {title:<18} {shown(path) if path.exists() else '(not drawn)'}")
