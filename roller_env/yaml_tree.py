@@ -9,8 +9,10 @@ editors do: ``yes``, ``on``, ``12:30`` and ``2026-11-26`` are text, ``1e3`` is a
 
 from __future__ import annotations
 
+import gc
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
@@ -127,6 +129,22 @@ class YamlError(ProblemsError):
     """A text that is not the YAML wanted here; ``problems`` says all that is wrong, and where."""
 
 
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Let Python's collector rest while very many objects are made, none of them in a cycle.
+
+    With each ten thousand or so it would look through all objects of the process again, which in a
+    large one takes longer than what is done here.
+    """
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
 def read_tree(text: str, filename: str) -> Node:
     """Read the one mapping that a file's text is.
 
@@ -138,7 +156,8 @@ def read_tree(text: str, filename: str) -> Node:
         YamlError: the text is no YAML, holds a tag, a repeated key, a merge key, several
             documents or no mapping, or is larger than the limits above.
     """
-    return _Reader(text, filename).document(of_fields=True)
+    with uncollected():
+        return _Reader(text, filename).document(of_fields=True)
 
 
 def read_value(text: str, filename: str) -> Node:
@@ -147,7 +166,8 @@ def read_value(text: str, filename: str) -> Node:
     Raises:
         YamlError: as for `read_tree`, but that it need not be a mapping.
     """
-    return _Reader(text, filename).document(of_fields=False)
+    with uncollected():
+        return _Reader(text, filename).document(of_fields=False)
 
 
 def plain_tree(mapping: Mapping[Any, Any]) -> Node:

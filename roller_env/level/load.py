@@ -31,7 +31,7 @@ from roller_env.level.schema import METRES_PER_UNIT, SCALE_KEY, Level
 from roller_env.level.words import Unit
 from roller_env.problems import Problem, listed, quoted
 from roller_env.regular_files import read_regular_file
-from roller_env.yaml_tree import MAX_BYTES, Node, YamlError, plain_tree, read_tree
+from roller_env.yaml_tree import MAX_BYTES, Node, YamlError, plain_tree, read_tree, uncollected
 
 SUFFIXES: Final = (".yaml", ".yml")
 
@@ -124,6 +124,7 @@ def _tree(read: Callable[[], Node]) -> Node:
         raise LevelError(error.problems) from None
 
 
+@uncollected()
 def _examined(root: Node, text: str, filename: str) -> tuple[Level, list[Problem]]:
     """Return the level that a tree says, if it is right in shape and in meaning, and its doubts."""
     unit = _unit(root)
