@@ -573,11 +573,11 @@ class Simulation:
         Raises:
             ValueError: the snapshot is of another game, or does not fit the rows.
         """
+        self.check_snapshot(snapshot)
         count = len(snapshot)
         rows = self._checked(np.arange(count) if rows is None else rows)
         if len(rows) != count:
             raise ValueError(f"rows: found {len(rows)} for a snapshot of {count}")
-        self.check_snapshot(snapshot)
         self._stepper.reset(np.sort(rows))
         self._stepper.state[rows] = snapshot.physics
         self.state.set_rows(rows, snapshot.game)

@@ -22,7 +22,7 @@ import tyro
 from roller_env.game.cameras import MODES
 from roller_env.level import load_level, shipped_levels
 from roller_env.physics.presets import PRESETS
-from roller_env.problems import printable
+from roller_env.problems import printable, shown
 from roller_env.replay import (
     Replay,
     ReplayError,
@@ -92,6 +92,8 @@ def main(argv: Sequence[str] | None = None, prog: str | None = None) -> int:
         return _replay(tyro.cli(Arguments, args=argv, prog=prog, description=__doc__))
     except (ReplayError, RuntimeError) as error:
         sys.exit(f"error: {printable(error)}")
+    except OSError as error:
+        sys.exit(f"error: {shown(error.filename or 'output')}: {error.strerror or error}")
 
 
 def _replay(arguments: Arguments) -> int:

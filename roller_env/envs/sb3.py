@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -75,6 +75,11 @@ class RollerVecEnv(VecEnv):
             LevelError: the level is not valid.
         """
         seed = seed_of(seed)
+        if "autoreset_mode" in options:
+            raise TypeError(
+                f"{type(self).__name__}() got an unexpected keyword argument 'autoreset_mode'; its "
+                "rows are reset as Stable-Baselines3 wants it"
+            )
         self.vector = RollerVectorEnv(
             num_envs, autoreset_mode=AutoresetMode.SAME_STEP, level=level, **options
         )
@@ -226,6 +231,22 @@ class RollerVecEnv(VecEnv):
             )
         setattr(self.vector, attr_name, value)
 
+    def set_options(self, options: list[dict[str, Any]] | dict[str, Any] | None = None) -> None:
+        """Keep the options of the next `reset`: one mapping for all rows, or one for each.
+
+        Raises:
+            TypeError: it is neither a mapping nor a list of mappings.
+            ValueError: there are more or fewer mappings than rows.
+        """
+        each = options if isinstance(options, list) else [options or {}]
+        if not all(isinstance(one, Mapping) for one in each):
+            raise TypeError(f"options: found {options!r}; must be a mapping, or a list of mappings")
+        if isinstance(options, list) and len(options) != self.num_envs:
+            raise ValueError(
+                f"options: found {len(options)} mappings; needed is one a row, {self.num_envs}"
+            )
+        super().set_options(options)
+
     def env_method(
         self, method_name: str, *args: Any, indices: VecEnvIndices = None, **kwargs: Any
     ) -> list[Any]:
@@ -303,4 +324,9 @@ class RollerVecEnv(VecEnv):
         if is_whole(indices):
             indices = [indices]
         numbers = range(self.num_envs)
-        return [numbers[index] for index in self._get_indices(indices)]
+        found = list(self._get_indices(indices))
+        if not all(is_whole(index) and -self.num_envs <= index < self.num_envs for index in found):
+            raise IndexError(
+                f"indices: found {found}; must be row numbers from 0 to {self.num_envs - 1}"
+            )
+        return [numbers[index] for index in found]

@@ -28,11 +28,20 @@ def floats(name: str, value: npt.ArrayLike) -> Float64:
     """
     try:
         given = np.asarray(value)
+        if isinstance(value, list | tuple) and _has_truth_values(value):
+            raise TypeError("there are truth values among them")
         if given.dtype.kind not in "iufO":
             raise TypeError(f"they are of type {given.dtype}")
         return np.array(given, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
         raise ValueError(f"{name} must be numbers, got {value!r}: {error}") from error
+
+
+def _has_truth_values(value: object) -> bool:
+    """Say whether a nested list holds True or False, which beside numbers NumPy makes 1 and 0."""
+    if isinstance(value, list | tuple):
+        return any(map(_has_truth_values, value))
+    return isinstance(value, bool | np.bool_)
 
 
 def numbers(name: str, value: npt.ArrayLike) -> Float64:
@@ -134,9 +143,9 @@ def number(name: str, value: SupportsFloat) -> float:
     """Return one number, which may be NaN or infinite.
 
     Raises:
-        ValueError: when it is none: a word or an array.
+        ValueError: when it is none: a word, a truth value or an array.
     """
-    if isinstance(value, (str, bytes)) or np.ndim(value) != 0:  # type: ignore[arg-type]
+    if isinstance(value, (str, bytes, bool, np.bool_)) or np.ndim(value) != 0:  # type: ignore[arg-type]
         raise ValueError(f"{name} must be one number, got {value!r}")
     try:
         return float(value)
@@ -199,6 +208,8 @@ def chosen(name: str, value: npt.ArrayLike, count: int) -> npt.NDArray[np.intp]:
         ValueError: on a mask of another length, fractions, a row that is not there, or no row.
     """
     given = np.asarray(value)
+    if given.dtype.kind != "b" and _has_truth_values(value):
+        raise ValueError(f"{name} must be a mask or whole numbers, not some of both, got {value!r}")
     if given.dtype.kind == "b":
         if given.shape != (count,):
             raise ValueError(f"{name}: a mask must have shape ({count},), got {given.shape}")

@@ -124,12 +124,13 @@ def from_axis_angle(axis: npt.ArrayLike, angle_rad: npt.ArrayLike) -> Float64:
     return q
 
 
-def from_rotation_vector(vector: Float64) -> Float64:
+def from_rotation_vector(vector: npt.ArrayLike) -> Float64:
     """Return the rotation about ``vector`` (..., 3) by its length: the exponential map.
 
     A body turning at constant omega (world frame) for t seconds goes from q to
     ``multiply(from_rotation_vector(omega * t), q)``, exactly.
     """
+    vector = np.asarray(vector, dtype=np.float64)
     half = 0.5 * norm(vector)
     ratio = np.divide(np.sin(half), half, out=np.ones_like(half), where=half > 0.0)
     q = np.empty((*vector.shape[:-1], 4))
@@ -158,13 +159,14 @@ def angle_between(a: Float64, b: Float64) -> Float64:
     return angle
 
 
-def slerp(a: Float64, b: Float64, fraction: npt.ArrayLike) -> Float64:
+def slerp(a: npt.ArrayLike, b: npt.ArrayLike, fraction: npt.ArrayLike) -> Float64:
     """Return the orientation ``fraction`` (...) of the way from a to b, at constant speed.
 
     The short way round: b and -b give the same result. Source: Shoemake 1985, "Animating Rotation
     with Quaternion Curves", written with the logarithm, which needs no special case for close
     orientations.
     """
+    a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
     way = to_rotation_vector(multiply(conjugate(a), b))
     return multiply(
         a, from_rotation_vector(way * np.asarray(fraction, dtype=np.float64)[..., None])

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import roller_env
-from roller_env.cli import COMMANDS, main
+from roller_env.cli import COMMANDS, main, replay
 from roller_env.cli.train import config_file, shipped_configs
 from roller_env.level import shipped_levels
 from roller_env.training import ConfigError, load_config
@@ -146,3 +146,14 @@ def test_what_is_wrong_is_said_in_one_line(
     assert error.startswith("error: ")
     assert error.count("\n") == 1
     assert message in error
+
+
+@pytest.mark.parametrize("option", ["--sheet", "--convert"])
+def test_a_replay_that_cannot_be_written_is_one_line_that_names_the_file(
+    option: str, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("not a directory")
+    suffix = ".png" if option == "--sheet" else ".replay"
+    target = tmp_path / "file" / f"x{suffix}"
+    with pytest.raises(SystemExit, match=r"^error: .*/file.*: [A-Z][a-z ]+$"):
+        replay.main(["flat", option, str(target)])

@@ -250,6 +250,8 @@ def test_what_is_no_state_or_not_of_as_many_rows_is_refused() -> None:
         vector.get_state([3])
     with pytest.raises(TypeError, match="snapshot: found"):
         vector.set_state([1, 2, 3])  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="snapshot: found"):
+        vector.set_state(None)  # type: ignore[arg-type]
     single = RollerEnv(**OPTIONS)
     with pytest.raises(ValueError, match="rows: found 1 for a snapshot of 3"):
         single.set_state(vector.get_state())

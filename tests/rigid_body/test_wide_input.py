@@ -396,3 +396,23 @@ def test_a_pacer_takes_frames_of_any_length(
 def test_a_pacer_of_no_whole_number_of_steps_is_refused(most: Any) -> None:
     with pytest.raises(ValueError, match="max_steps must be"):
         FixedStepPacer(0.01, max_steps=most)
+
+
+def test_a_list_that_is_half_a_mask_is_refused() -> None:
+    mixed: Any = [True, 0, 1]
+    with pytest.raises(ValueError, match="a mask or whole numbers, not some of both"):
+        Body.cube(size=1.0, mass=[1.0, 2.0, 3.0]).take(mixed)
+
+
+def test_truth_values_are_no_numbers_wherever_they_stand() -> None:
+    wrong: Any = True
+    state = State.create(Body.cube(size=1.0, mass=1.0))
+    with pytest.raises(ValueError, match="dt must be one number, got True"):
+        advance(state, RK4, wrong, 1)
+    with pytest.raises(ValueError, match="axis must be numbers"):
+        quaternion.from_axis_angle((wrong, 0, 0), 1.0)
+
+
+def test_rotations_take_plain_tuples() -> None:
+    half = quaternion.slerp((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), 0.5)
+    assert half == pytest.approx(quaternion.from_rotation_vector((0.0, 0.0, np.pi / 2)))

@@ -46,3 +46,23 @@ def test_an_action_outside_the_space_is_refused(mode: str, action: Any, says: st
     games.reset()
     with pytest.raises(ValueError, match=says):
         games.step(np.array([action, action]))
+
+
+def test_the_autoreset_mode_is_not_the_callers_to_choose() -> None:
+    with pytest.raises(TypeError, match="unexpected keyword argument 'autoreset_mode'"):
+        RollerVecEnv("flat", 2, autoreset_mode="NEXT_STEP")
+
+
+@pytest.mark.parametrize(
+    ("options", "error"), [(5, TypeError), ([{"intro": True}], ValueError), ([1, 2], TypeError)]
+)
+def test_options_that_do_not_fit_the_rows_are_refused_when_they_are_set(
+    options: Any, error: type[Exception]
+) -> None:
+    with pytest.raises(error, match="options: found"):
+        RollerVecEnv("flat", 2).set_options(options)
+
+
+def test_a_row_that_is_not_there_is_told_by_its_number() -> None:
+    with pytest.raises(IndexError, match=r"indices: found \[7\]; must be row numbers from 0 to 1"):
+        RollerVecEnv("flat", 2).env_method("reset", indices=[7])
