@@ -21,10 +21,12 @@ from __future__ import annotations
 import errno
 import functools
 import re
+import signal
 import socket
 import sys
 import threading
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, Final
 
 from mujoco.studio import launch_thread, messages, plugin, viewer_handle, viewer_protocol
@@ -181,16 +183,42 @@ def open_window(plugins: Plugins) -> viewer_handle.ViewerHandle:
 def run(handle: viewer_handle.ViewerHandle, ended: Callable[[], bool] = lambda: False) -> None:
     """Let the game run until its window is closed, Ctrl+C is pressed, or ``ended`` says so.
 
+    A terminal that is closed and a request to terminate end it as Ctrl+C does: between two steps.
+
     Raises:
         RuntimeError: the page cannot be served, such as on a port that is taken.
     """
-    with handle:
+    with handle, _signals_between_steps() as asked_to_end:
         handle.dispatch(messages.LoadModelEvent(path=""))
         try:
-            while not ended() and handle.is_running():
+            while not asked_to_end.is_set() and not ended() and handle.is_running():
                 handle.sync()
         except KeyboardInterrupt:
+            asked_to_end.set()
+        if asked_to_end.is_set():
             print("\nGood bye.", flush=True)
+
+
+@contextmanager
+def _signals_between_steps() -> Iterator[threading.Event]:
+    """Let signals that end a program be kept in mind instead of interrupting what is being done.
+
+    An exception in the middle of a step would leave a ball that has moved in a game that has not,
+    and a replay of it that is of no game. The second signal of a kind interrupts.
+    """
+    asked = threading.Event()
+
+    def remember(number: int, _: object) -> None:
+        signal.signal(number, signal.default_int_handler)
+        asked.set()
+
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.signal(number, remember) for number in numbers}
+    try:
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def warning_of(host: str) -> str | None:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import socket
 import sys
 from pathlib import Path
+from types import TracebackType
+from typing import Any
 
 import pytest
 from websockets.exceptions import InvalidStatus
@@ -83,3 +87,46 @@ def test_a_port_that_is_taken_is_said_to_be() -> None:
 def test_a_window_on_an_old_python_is_refused_with_what_helps() -> None:
     with pytest.raises(PlayError, match=r"needs Python 3\.12 or newer.*--viewer web"):
         open_window([])
+
+
+class InterruptedGame:
+    """What `run` runs, whose step is under way when a signal comes."""
+
+    def __init__(self, number: signal.Signals) -> None:
+        self.number = number
+        self.begun = self.ended = 0
+
+    def __enter__(self) -> InterruptedGame:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        assert error is None
+
+    def dispatch(self, message: object) -> None:
+        pass
+
+    def is_running(self) -> bool:
+        return True
+
+    def sync(self) -> None:
+        self.begun += 1
+        if self.begun == 3:
+            os.kill(os.getpid(), self.number)
+        self.ended += 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_game_that_is_told_to_end_makes_its_step_first(
+    number: signal.Signals, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = signal.getsignal(number)
+    game: Any = InterruptedGame(number)
+    run(game)
+    assert (game.begun, game.ended) == (3, 3)
+    assert "Good bye." in capsys.readouterr().out
+    assert signal.getsignal(number) is before
