@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.game.compiled import compiled
+from roller_env.compiled import compiled
 from roller_env.units import METRES_PER_QUANT, quants
 
 Float64 = npt.NDArray[np.float64]

@@ -13,7 +13,7 @@ from typing import Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.game.compiled import compiled
+from roller_env.compiled import compiled
 from roller_env.game.state import GameState
 from roller_env.game.tables import Kind, LevelTable
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env import checks
-from roller_env.game.compiled import compiled
+from roller_env.compiled import compiled
 from roller_env.game.state import GameState
 from roller_env.game.sweep import Events
 from roller_env.game.tables import LevelTable

@@ -14,8 +14,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.compiled import compiled
 from roller_env.game import cameras, slabs
-from roller_env.game.compiled import compiled
 from roller_env.game.state import GameState
 from roller_env.game.sweep import Events, Motion
 from roller_env.game.tables import Kind, LevelTable

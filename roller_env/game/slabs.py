@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.game.compiled import compiled
+from roller_env.compiled import compiled
 
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]

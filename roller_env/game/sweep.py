@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.game.compiled import compiled
+from roller_env.compiled import compiled
 from roller_env.game.state import GameState
 from roller_env.game.tables import Kind, LevelTable
 from roller_env.level.schema import COIN_REACH_M

@@ -51,5 +51,34 @@ def test_who_waits_in_every_process_is_told_how_not_to(tmp_path: Path) -> None:
 
 
 def test_others_who_compile_hear_nothing_of_it(tmp_path: Path) -> None:
-    code = "import numba, roller_env.game.compiled\nnumba.njit(lambda x: x + 1)(1)"
+    code = "import numba, roller_env.compiled\nnumba.njit(lambda x: x + 1)(1)"
     assert said_by_a_new_process(tmp_path, code) == []
+
+
+def test_what_was_kept_of_a_package_is_not_used_when_one_of_its_modules_has_changed(
+    tmp_path: Path,
+) -> None:
+    package = tmp_path / "pair"
+    package.mkdir()
+    decorate = "from roller_env.compiled import compiled_with_package as kernel\n@kernel\n"
+    (package / "inner.py").write_text(f"{decorate}def one() -> float:\n    return 1.0\n")
+    (package / "outer.py").write_text(
+        f"from pair.inner import one\n{decorate}def two() -> float:\n    return 2.0 * one()\n"
+    )
+
+    def answer() -> tuple[str, int]:
+        code = "from pair.outer import two; print(two(), sum(two.stats.cache_hits.values()))"
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            env=os.environ | {"PYTHONPATH": f"{tmp_path}:{Path(__file__).parents[2]}"},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        number, hits = done.stdout.split()
+        return number, int(hits)
+
+    assert answer() == ("2.0", 0)
+    assert answer() == ("2.0", 1)
+    (package / "inner.py").write_text(f"{decorate}def one() -> float:\n    return 1.25\n")
+    assert answer() == ("2.5", 0)

@@ -1,17 +1,17 @@
 """Loops over rows, compiled to machine code by Numba.
 
 In NumPy a step of a single game is a hundred calls on arrays of three numbers, which cost several
-times the physics. The rules are therefore written as what they are, loops over games and pieces,
-and compiled. Numba keeps no record of what a compiled function takes from *other* files, so one
-uses only functions and constants of its own module; the rest are its arguments. With
-``NUMBA_DISABLE_JIT=1`` all of it runs as plain Python, to the same bits.
+times the physics. What runs in every step is therefore written as what it is, loops over games and
+pieces, and compiled. With ``NUMBA_DISABLE_JIT=1`` all of it runs as plain Python, to the same bits.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from typing import ParamSpec, TypeVar, cast
+from functools import cache
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 from numba.core import event
@@ -24,17 +24,45 @@ def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Return ``function`` compiled at its first call.
 
     The machine code is kept for the next process: beside the module, or in the user's cache
-    directory, or not at all where neither can be written to.
+    directory, or not at all where neither can be written to. Numba keeps no record of what a
+    function takes from *other* files, so one uses only functions and constants of its own module;
+    the rest are its arguments.
 
     Arithmetic is IEEE's, in the order written: no fused or reassociated operations, so a result
     depends neither on the number of rows nor on the processor. Indices are not checked.
     """
+    return cast("Callable[_P, _R]", _dispatcher(function))
+
+
+def compiled_with_package(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Return ``function`` compiled as `compiled` does, to run without Python's lock.
+
+    It may use functions and constants of all modules in its own directory: what was kept of it is
+    compiled anew when any of them has changed.
+    """
+    dispatcher = _dispatcher(function, nogil=True)
+    file = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+    if file is not None:
+        # Of the function's own file, as Numba has it; it has no name for a stamp of several.
+        file._source_stamp = _stamp(Path(function.__code__.co_filename).parent)
+    return cast("Callable[_P, _R]", dispatcher)
+
+
+def _dispatcher(function: Callable[..., Any], *, nogil: bool = False) -> Any:
     try:
-        return cast("Callable[_P, _R]", numba.njit(cache=True, error_model="numpy")(function))
+        return numba.njit(cache=True, nogil=nogil, error_model="numpy")(function)
     except RuntimeError:
         # Nowhere to write: neither beside the package nor in the user's cache directory.
         _WAIT.kept = False
-        return cast("Callable[_P, _R]", numba.njit(error_model="numpy")(function))
+        return numba.njit(nogil=nogil, error_model="numpy")(function)
+
+
+@cache
+def _stamp(directory: Path) -> tuple[tuple[str, float, int], ...]:
+    """Return what changes when a module of a directory does."""
+    files = sorted(directory.glob("*.py"))
+    states = [(file.name, file.stat()) for file in files]
+    return tuple((name, state.st_mtime, state.st_size) for name, state in states)
 
 
 class _Wait(event.Listener):
