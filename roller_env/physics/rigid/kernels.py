@@ -1,0 +1,94 @@
+"""Vectors for compiled code: tuples of three numbers, which live in registers."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from roller_env.compiled import compiled_with_package as kernel
+
+__all__ = ["kernel"]
+
+Vector = tuple[float, float, float]
+
+
+@kernel
+def dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def cross(a: Vector, b: Vector) -> Vector:
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+@kernel
+def norm(a: Vector) -> float:
+    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+@kernel
+def add(a: Vector, b: Vector) -> Vector:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@kernel
+def sub(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@kernel
+def scaled(factor: float, a: Vector) -> Vector:
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+@kernel
+def plus(a: Vector, factor: float, b: Vector) -> Vector:
+    """Return ``a + factor b``."""
+    return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
+
+
+@kernel
+def tangential(a: Vector, normal: Vector) -> Vector:
+    """Return the part of ``a`` at right angles to the unit vector ``normal``."""
+    return plus(a, -dot(a, normal), normal)
+
+
+@kernel
+def row(array: Any, index: int) -> Vector:
+    """Return the first three numbers of a row of a matrix."""
+    return array[index, 0], array[index, 1], array[index, 2]
+
+
+@kernel
+def put(array: Any, index: int, a: Vector) -> None:
+    """Write a vector into the first three places of a row of a matrix."""
+    array[index, 0] = a[0]
+    array[index, 1] = a[1]
+    array[index, 2] = a[2]
+
+
+@kernel
+def first_root(c: float, b: float, a: float) -> float:
+    """Return the smallest s >= 0 at which ``c + b s + a s^2`` falls to 0; ``inf`` if it never does.
+
+    ``c`` below 0 counts as 0: what is there already leaves at once unless it rises.
+    """
+    if c <= 0.0:
+        if b < 0.0 or (b == 0.0 and a < 0.0):
+            return 0.0
+        return -b / a if a < 0.0 else math.inf
+    if a == 0.0:
+        return -c / b if b < 0.0 else math.inf
+    discriminant = b * b - 4.0 * a * c
+    if discriminant < 0.0:
+        return math.inf
+    root = math.sqrt(discriminant)
+    # Neither form subtracts numbers that are nearly equal.
+    if b < 0.0:
+        return 2.0 * c / (root - b)
+    return (b + root) / (-2.0 * a) if a < 0.0 else math.inf
