@@ -20,10 +20,10 @@ from roller_env.game.state import GameState, score_percent
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level, load_level
 from roller_env.level.check import obstacles, obstructions
-from roller_env.level.expand import Solid
-from roller_env.level.schema import MAX_COORDINATE_M
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.physics.stepper import Stepper
+from roller_env.pieces.fields import MAX_COORDINATE_M
+from roller_env.pieces.piece import Solid
 
 Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]

@@ -12,30 +12,19 @@ from typing import Any
 import yaml
 from hypothesis import strategies as st
 
-from roller_env.level.schema import (
-    METRES_PER_UNIT,
-    Ball,
-    Box,
-    CameraTrigger,
-    CoinArc,
-    CoinGrid,
-    CoinLine,
-    Coins,
-    Finish,
-    FloorCell,
-    FloorPlan,
-    Gate,
-    Level,
-    LiftPad,
-    Material,
-    Opening,
-    Plate,
-    Ramp,
-    Route,
-    Start,
-    Tube,
-    Wall,
-)
+from roller_env.level.schema import Ball, Level, Material, Route, Start
+from roller_env.pieces.box import Box
+from roller_env.pieces.camera_trigger import CameraTrigger
+from roller_env.pieces.coin import CoinArc, CoinGrid, CoinLine, Coins
+from roller_env.pieces.fields import METRES_PER_UNIT
+from roller_env.pieces.finish import Finish
+from roller_env.pieces.floor import FloorCell, FloorPlan
+from roller_env.pieces.gate import Gate
+from roller_env.pieces.lift_pad import LiftPad
+from roller_env.pieces.plate import Plate
+from roller_env.pieces.ramp import Ramp
+from roller_env.pieces.tube import Opening, Tube
+from roller_env.pieces.wall import Wall
 
 SLOT_M = 6.0
 LANE_HALF_WIDTH_M = 3.0

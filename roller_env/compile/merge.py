@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.level.expand import Solid
+from roller_env.pieces.piece import Solid
 
 GRID_M = 1e-6
 """Coordinates that differ by less are the same edge: a micrometre, far below any contact's

@@ -13,10 +13,14 @@ import mujoco
 import numpy as np
 
 from roller_env.compile.merge import merge_solids
-from roller_env.level.expand import Solid, rotation_matrix, solids
-from roller_env.level.schema import Gate, Level, LiftPad, Material, Plate
+from roller_env.level.expand import expand
+from roller_env.level.schema import Level, Material
 from roller_env.physics.materials import contact_parameters
 from roller_env.physics.presets import PhysicsPreset
+from roller_env.pieces.gate import Gate
+from roller_env.pieces.lift_pad import LiftPad
+from roller_env.pieces.piece import Solid, rotation_matrix
+from roller_env.pieces.plate import Plate
 
 BALL: Final = "ball"
 FORCE_ACTUATORS: Final = ("force_x", "force_y", "lift")
@@ -56,7 +60,7 @@ def build_spec(level: Level, preset: PhysicsPreset) -> mujoco.MjSpec:
     spec.modelname = level.name
     _set_options(spec, level, preset)
     _add_ball(spec, level)
-    merged = merge_solids(solids(level))
+    merged = merge_solids(expand(level).ground)
     names = {solid.material for solid in merged}
     contacts = {name: _contact(level, preset, level.material(name)) for name in names}
     for number, solid in enumerate(merged):

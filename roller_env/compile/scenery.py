@@ -21,9 +21,15 @@ from roller_env.compile import textures
 from roller_env.compile.merge import merge_solids
 from roller_env.compile.mjcf import BALL, build_spec
 from roller_env.compile.surfaces import Surface, box_surfaces, full_turn, lathe, tube_surface
-from roller_env.level.expand import Solid, coin_positions, rotation_matrix, solids, tube_frame
-from roller_env.level.schema import CameraTrigger, Gate, Level, LiftPad, Material, Plate, Tube
+from roller_env.level.expand import expand
+from roller_env.level.schema import Level, Material
 from roller_env.physics.presets import PhysicsPreset
+from roller_env.pieces.camera_trigger import CameraTrigger
+from roller_env.pieces.gate import Gate
+from roller_env.pieces.lift_pad import LiftPad
+from roller_env.pieces.piece import Solid, rotation_matrix
+from roller_env.pieces.plate import Plate
+from roller_env.pieces.tube import Tube
 from roller_env.units import quants
 
 Float64 = npt.NDArray[np.float64]
@@ -191,7 +197,7 @@ def _add_ground(spec: mujoco.MjSpec, level: Level) -> None:
         if geom.name.startswith("solid_"):
             geom.group = _HIDDEN_GROUP
     by_material: dict[str, list[Solid]] = defaultdict(list)
-    for solid in merge_solids(s for s in solids(level) if not _of_tube(s)):
+    for solid in merge_solids(s for s in expand(level).ground if not _of_tube(s)):
         by_material[solid.material].append(solid)
     for name, pieces in by_material.items():
         material = level.material(name)
@@ -254,7 +260,7 @@ def _paint_ball(spec: mujoco.MjSpec) -> None:
 
 def _add_tubes(spec: mujoco.MjSpec, level: Level) -> None:
     panels: dict[str, list[Solid]] = defaultdict(list)
-    for solid in solids(level):
+    for solid in expand(level).ground:
         if _of_tube(solid):
             panels[solid.source].append(solid)
     for number, tube in enumerate(level.tubes):
@@ -280,7 +286,7 @@ def _add_rings(spec: mujoco.MjSpec, tube: Tube, number: int) -> None:
     outer = (tube.inner_radius + tube.thickness) / math.cos(math.pi / tube.sides)
     band, collar, height = outer + quants(0.5), outer + quants(3.0), quants(5.0)
     turn = full_turn(4 * tube.sides)
-    frame = tube_frame(tube)
+    frame = tube.frame
     frame[:, 1] = np.cross(frame[:, 2], frame[:, 0])
     orientation = np.empty(4)
     mujoco.mju_mat2Quat(orientation, frame.ravel())
@@ -361,7 +367,7 @@ def _dress_pad(spec: mujoco.MjSpec, pad: LiftPad, number: int) -> None:
 
 
 def _add_coins(spec: mujoco.MjSpec, level: Level) -> None:
-    positions, _ = coin_positions(level)
+    positions = expand(level).coins
     if len(positions) == 0:
         return
     segments = 24 if len(positions) <= _DETAILED_COINS else 8

@@ -16,8 +16,8 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.level.expand import Solid, tube_frame
-from roller_env.level.schema import Tube
+from roller_env.pieces.piece import Solid
+from roller_env.pieces.tube import Tube
 from roller_env.units import quants
 
 Float64 = npt.NDArray[np.float64]
@@ -157,7 +157,7 @@ def tube_surface(tube: Tube, panels: Iterable[Solid]) -> Surface:
     length, stretch = math.dist(tube.start, tube.end), 1.0 / math.cos(math.pi / tube.sides)
     inner, outer = tube.inner_radius * stretch, (tube.inner_radius + tube.thickness) * stretch
     profile = [(outer, 0.0), (outer, length), (inner, length), (inner, 0.0), (outer, 0.0)]
-    frame = tube_frame(tube)
+    frame = tube.frame
     frame[:, 1] = np.cross(frame[:, 2], frame[:, 0])
     half_angle = math.pi / tube.sides
     arcs = []

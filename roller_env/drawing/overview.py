@@ -15,7 +15,7 @@ from roller_env.drawing.renderer import look
 from roller_env.drawing.stage import Stage
 from roller_env.game.state import GameState
 from roller_env.game.tables import LevelTable
-from roller_env.level.expand import solids
+from roller_env.level.expand import expand
 from roller_env.level.schema import Level
 from roller_env.physics.presets import physics_preset
 
@@ -76,7 +76,7 @@ def level_corners(level: Level) -> Float64:
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     corners = [
         signs * solid.half_size @ np.array(solid.rotation).T + solid.centre
-        for solid in solids(level)
+        for solid in expand(level).ground
     ]
     for pieces in (level.plates, level.gates, level.lift_pads):
         corners += [signs * np.array(piece.size) / 2 + piece.at for piece in pieces]

@@ -27,7 +27,7 @@ from roller_env.compile.scenery import (
 from roller_env.compile.textures import parse_colour
 from roller_env.game.cameras import MODE_BELOW, MODE_FIRST_PERSON, TriggerKind
 from roller_env.game.state import GameState
-from roller_env.level.expand import coin_positions
+from roller_env.level.expand import expand
 from roller_env.level.schema import Level
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.units import quants
@@ -73,7 +73,7 @@ class Stage:
         """Build the scenery of ``level`` and put it into the state in which the game starts."""
         self.model = build_scenery(level, preset)
         self.data = mujoco.MjData(self.model)
-        model, coins = self.model, len(coin_positions(level)[0])
+        model, coins = self.model, len(expand(level).coins)
         self._level = level
         self._rgba = model.geom_rgba.copy()
         self._ball = model.geom("ball").id

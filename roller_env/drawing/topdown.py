@@ -15,8 +15,9 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from roller_env.level.expand import Solid, coin_positions, rotation_matrix, solids
+from roller_env.level.expand import expand
 from roller_env.level.schema import Level
+from roller_env.pieces.piece import Solid, rotation_matrix
 
 Float64 = npt.NDArray[np.float64]
 Colour = tuple[float, float, float, float]
@@ -109,7 +110,7 @@ def draw_paths(
 
 def _storeys(level: Level) -> list[_Storey]:
     """Cut the level where nothing but tubes is for a good height."""
-    boxes = _coloured(level, (s for s in solids(level) if not s.source.startswith("tubes[")))
+    boxes = _coloured(level, (s for s in expand(level).ground if not s.source.startswith("tubes[")))
     boxes += _machine_boxes(level)
     spans = sorted(
         ((*_span(box[0]), index) for index, box in enumerate(boxes)), key=lambda span: span[0]
@@ -132,7 +133,7 @@ def _coloured(level: Level, pieces: Iterable[Solid]) -> list[tuple[Solid, Colour
 
 
 def _tube_boxes(level: Level) -> list[tuple[Solid, Colour]]:
-    return _coloured(level, (s for s in solids(level) if s.source.startswith("tubes[")))
+    return _coloured(level, (s for s in expand(level).ground if s.source.startswith("tubes[")))
 
 
 def _machine_boxes(level: Level) -> list[tuple[Solid, Colour]]:
@@ -214,7 +215,7 @@ def _draw_pieces(
 ) -> None:
     """Draw coins, finish, start and names of what lies from ``low`` to ``high``."""
     right, up, _ = view
-    coins, _ = coin_positions(level)
+    coins = expand(level).coins
     coins = coins[(coins[:, 2] > low) & (coins[:, 2] <= high)]
     axes.scatter(
         coins[:, right], coins[:, up], s=26, c="#ffd43b", edgecolors="#8a6500", lw=0.8, zorder=4

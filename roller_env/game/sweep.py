@@ -18,7 +18,7 @@ import numpy.typing as npt
 from roller_env.compiled import compiled
 from roller_env.game.state import GameState
 from roller_env.game.tables import Kind, LevelTable
-from roller_env.level.schema import COIN_REACH_M
+from roller_env.pieces.coin import COIN_REACH_M
 
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]

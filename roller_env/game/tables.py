@@ -17,8 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.game.cameras import TriggerKind
-from roller_env.level.expand import coin_positions, pad_groups
-from roller_env.level.schema import PLATE_HIT_HEIGHT_M, Level
+from roller_env.level.expand import expand
+from roller_env.level.schema import Level
+from roller_env.pieces.lift_pad import pad_groups
+from roller_env.pieces.plate import PLATE_HIT_HEIGHT_M
 
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
@@ -115,7 +117,7 @@ class LevelTable:
                     result[index, : len(row)] = row
             return result
 
-        coins = [coin_positions(level)[0] for level in levels]
+        coins = [expand(level).coins for level in levels]
         coin_at = np.full((count, max(map(len, coins)), 3), FAR_M)
         for places, own in zip(coin_at, coins, strict=True):
             places[: len(own)] = np.reshape(own, (-1, 3))
@@ -153,7 +155,7 @@ class LevelTable:
             gate_speed=pad(lambda level: [g.speed for g in level.gates]),
             pad_force_n=pad(lambda level: [p.force_n for p in level.lift_pads]),
             pad_duration_s=pad(lambda level: [p.duration_s for p in level.lift_pads]),
-            pad_group=pad(pad_groups).astype(np.int64),
+            pad_group=pad(lambda level: pad_groups(level.lift_pads)).astype(np.int64),
             trigger_kind=pad(
                 lambda level: [TriggerKind[t.kind.upper()] for t in level.camera_triggers]
             ).astype(np.int64),

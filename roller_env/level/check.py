@@ -13,25 +13,14 @@ from typing import Final
 
 import numpy as np
 
-from roller_env.level.expand import (
-    TOUCHING_M,
-    Float64,
-    Solid,
-    coin_positions,
-    rotation_matrix,
-)
-from roller_env.level.schema import (
-    BUILT_IN_MATERIALS,
-    MAX_COINS,
-    MAX_PIECES,
-    PLATE_HIT_HEIGHT_M,
-    Coins,
-    Gate,
-    Level,
-    Plate,
-)
-from roller_env.level.space import burying, inside, is_static, solids_at_the_start, starts
+from roller_env.level.expand import expand
+from roller_env.level.schema import BUILT_IN_MATERIALS, MAX_PIECES, Level
+from roller_env.level.space import burying, inside, is_static, starts
 from roller_env.level.words import InUnit, Unit, coin_groups
+from roller_env.pieces.coin import MAX_COINS, Coins
+from roller_env.pieces.gate import Gate
+from roller_env.pieces.piece import TOUCHING_M, Float64, Solid, rotation_matrix
+from roller_env.pieces.plate import PLATE_HIT_HEIGHT_M, Plate
 from roller_env.problems import FieldPath, Problem, listed, quoted
 
 _PIECES_WITH_NAMES: Final = (
@@ -63,7 +52,7 @@ def check_level(level: Level, unit: Unit = "metre") -> list[Problem]:
     ]
     if too_many:  # expanding them could take all memory
         return problems
-    everything = solids_at_the_start(level)
+    everything = expand(level).at_the_start
     return [
         *problems,
         *_tubes(level, everything),
@@ -78,7 +67,7 @@ def obstacles(level: Level) -> tuple[Solid, ...]:
     finish = level.finish
     x, y, z = (edge / 2 for edge in finish.size)
     block = Solid(finish.at, (x, y, z), rotation_matrix(0.0), "default", "the finish")
-    return (*solids_at_the_start(level), block)
+    return (*expand(level).at_the_start, block)
 
 
 def obstructions(level: Level, blocks: Sequence[Solid], positions: Float64) -> dict[int, str]:
@@ -263,7 +252,7 @@ def _finish(level: Level, everything: Sequence[Solid]) -> Iterator[Problem]:
 
 
 def _coins(level: Level, in_unit: InUnit) -> Iterator[Problem]:
-    positions, sources = coin_positions(level)
+    positions, sources = expand(level).coins, expand(level).coin_sources
     low = np.flatnonzero(positions[:, 2] <= level.kill_height)
     limit = in_unit.length(level.kill_height)
     for path, text, _ in coin_groups(low, positions, sources, in_unit):

@@ -6,10 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from roller_env.level.expand import TOUCHING_M, Solid, coin_positions
+from roller_env.level.expand import expand
 from roller_env.level.schema import Level
-from roller_env.level.space import burying, held_up, inside, is_static, solids_at_the_start, starts
+from roller_env.level.space import burying, held_up, inside, is_static, starts
 from roller_env.level.words import InUnit, Unit, coin_groups
+from roller_env.pieces.piece import TOUCHING_M, Solid
 from roller_env.problems import Problem
 
 _STARTS = 5
@@ -26,7 +27,7 @@ def level_warnings(level: Level, unit: Unit = "metre") -> list[Problem]:
     Returns:
         The doubts, without places in a file; empty for a level without any.
     """
-    in_unit, everything = InUnit(unit), solids_at_the_start(level)
+    in_unit, everything = InUnit(unit), expand(level).at_the_start
     return [
         *_start(level, everything, in_unit),
         *_coins(level, everything, in_unit),
@@ -51,7 +52,7 @@ def _start(level: Level, everything: Sequence[Solid], in_unit: InUnit) -> Iterat
 
 
 def _coins(level: Level, everything: Sequence[Solid], in_unit: InUnit) -> Iterator[Problem]:
-    positions, sources = coin_positions(level)
+    positions, sources = expand(level).coins, expand(level).coin_sources
     around: dict[int, str] = {}
     for solid, indices in inside(everything, positions, -TOUCHING_M):
         around.update(dict.fromkeys(indices.tolist(), solid.source))

@@ -13,10 +13,10 @@ from typing import Final
 
 import numpy as np
 
-from roller_env.level.expand import coin_positions
+from roller_env.level.expand import expand
 from roller_env.level.reach import Landing, Play, Reach, reach
 from roller_env.level.schema import Level
-from roller_env.level.space import is_static, solids_at_the_start
+from roller_env.level.space import is_static
 from roller_env.level.spans import EDGE, free_spans
 from roller_env.level.words import InUnit, Unit, coin_groups
 from roller_env.problems import Problem
@@ -38,7 +38,7 @@ def lint(level: Level, play: Play, unit: Unit = "metre") -> list[Problem]:
         The warnings, without places in a file.
     """
     in_unit = InUnit(unit)
-    if not any(is_static(solid) for solid in solids_at_the_start(level)):
+    if not any(is_static(solid) for solid in expand(level).at_the_start):
         message = (
             "there is no floor, nothing solid that stands still; wanted floors, boxes or ramps"
         )
@@ -57,7 +57,7 @@ def _out_of_reach(level: Level, found: Reach, in_unit: InUnit) -> Iterator[Probl
     why = "out of reach of a ball from the start, however it is pushed"
     if not found.finish:
         yield Problem(("finish", "at"), f"the finish is {why}")
-    positions, sources = coin_positions(level)
+    positions, sources = expand(level).coins, expand(level).coin_sources
     for path, text, _ in coin_groups(np.flatnonzero(~found.coins), positions, sources, in_unit):
         yield Problem(path, f"{text} {why}")
     for index in np.flatnonzero(~found.plates).tolist():
@@ -66,7 +66,7 @@ def _out_of_reach(level: Level, found: Reach, in_unit: InUnit) -> Iterator[Probl
 
 def _gates(level: Level, in_unit: InUnit) -> Iterator[Problem]:
     """Yield the gates that stand in the way of a ball on the ground also when they are open."""
-    static = [solid for solid in solids_at_the_start(level) if is_static(solid)]
+    static = [solid for solid in expand(level).at_the_start if is_static(solid)]
     radius = level.ball.radius
     for index, gate in enumerate(level.gates):
         wide = math.hypot(gate.size[0], gate.size[1]) / 2 + 2.0 * radius

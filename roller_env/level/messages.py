@@ -14,7 +14,8 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 from pydantic_core.core_schema import ErrorType
 
-from roller_env.level.schema import COLOUR_PATTERN, NAME_PATTERN, Level
+from roller_env.level.schema import Level
+from roller_env.pieces.fields import COLOUR_PATTERN, NAME_PATTERN
 from roller_env.problems import MAX_PROBLEMS, FieldPath, Problem, listed, quoted
 from roller_env.yaml_tree import Node
 

@@ -16,10 +16,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from roller_env.level.expand import Float64, Solid, coin_positions, pad_groups
-from roller_env.level.schema import COIN_REACH_M, PLATE_HIT_HEIGHT_M, Level, Plate
-from roller_env.level.space import solids_at_the_start
+from roller_env.level.expand import expand
+from roller_env.level.schema import Level
 from roller_env.level.spans import EDGE, SLOPE, Bool, Indices, Spans, free_spans
+from roller_env.pieces.coin import COIN_REACH_M
+from roller_env.pieces.lift_pad import pad_groups
+from roller_env.pieces.piece import Float64, Solid
+from roller_env.pieces.plate import PLATE_HIT_HEIGHT_M, Plate
 
 _CLIMB: Final = 0.9
 """How far, in radii, the ball's centre may rise from one column to the next while it rolls: that of
@@ -125,7 +128,7 @@ def reach(level: Level, play: Play) -> Reach | None:
         What can be reached; None where that cannot be told: the ball starts over nothing, or the
         level is too large for the ball to be searched in a few seconds.
     """
-    coins, _ = coin_positions(level)
+    coins = expand(level).coins
     found = Reach(np.zeros(len(coins), bool), np.zeros(len(level.plates), bool), False, {})
     while True:
         flood = _flood(level, play, coins, found.plates)
@@ -182,7 +185,7 @@ def _solids(level: Level, struck: Bool) -> list[Solid]:
             down[f"gates[{index}]"] = gate.lowers_to
     return [
         replace(solid, centre=(*solid.centre[:2], down.get(solid.source, solid.centre[2])))
-        for solid in solids_at_the_start(level)
+        for solid in expand(level).at_the_start
     ]
 
 
@@ -296,7 +299,7 @@ class _Flood:
         rests, push_s = high, 0.0
         pads = [index for index in range(len(level.lift_pads)) if self._touches(index)]
         if pads:
-            groups = pad_groups(level)
+            groups = pad_groups(level.lift_pads)
             strongest: dict[int, float] = {}
             for index in pads:
                 group, force = groups[index], level.lift_pads[index].force_n

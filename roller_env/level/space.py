@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.level.expand import TOUCHING_M, Float64, Solid, rotation_matrix, solids
 from roller_env.level.schema import Level
+from roller_env.pieces.piece import TOUCHING_M, Float64, Solid
 
 Bool = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
@@ -21,18 +21,6 @@ _RING: Final = 8
 _RING_SHARE: Final = 0.9
 """Rays down to what may hold up a ball, besides the one through its middle: how many, and how far
 out, in radii."""
-
-
-def solids_at_the_start(level: Level) -> tuple[Solid, ...]:
-    """Return the static solids, and what moves where it stands at the start."""
-    blocks = list(solids(level))
-    for kind in ("plates", "gates", "lift_pads"):
-        for index, piece in enumerate(getattr(level, kind)):
-            length, width, height = piece.size
-            half = (length / 2, width / 2, height / 2)
-            rotation = rotation_matrix(getattr(piece, "yaw_deg", 0.0))
-            blocks.append(Solid(piece.at, half, rotation, "default", f"{kind}[{index}]"))
-    return tuple(blocks)
 
 
 def is_static(solid: Solid) -> bool:

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.level.expand import Float64, Solid
+from roller_env.pieces.piece import Float64, Solid
 
 Indices = npt.NDArray[np.intp]
 Bool = npt.NDArray[np.bool_]

@@ -21,7 +21,7 @@ from mujoco.studio.dear_imgui import dear_imgui as imgui
 from roller_env.config import LevelSource
 from roller_env.drawing.renderer import look
 from roller_env.level import Level, load_level, shipped_levels
-from roller_env.level.expand import coin_positions
+from roller_env.level.expand import expand
 from roller_env.play import panels
 from roller_env.play.camera import PlayerCamera
 from roller_env.play.effects import Flares
@@ -245,7 +245,7 @@ class ScreenPlugin(plugin.ViewerPlugin):  # type: ignore[misc]
     def on_scene(self, event: SceneEvent) -> None:
         """Take over a level's scenery."""
         self._scene, self._frame, self._shown = event, None, None
-        self._flares = Flares(coin_positions(event.level)[0])
+        self._flares = Flares(expand(event.level).coins)
         self.camera.reset()
 
     @messages.handler  # type: ignore[untyped-decorator]

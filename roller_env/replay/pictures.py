@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 from roller_env.drawing.canvas import Picture
 from roller_env.drawing.renderer import GameRenderer
 from roller_env.drawing.video import END_S, with_panel, write_video
-from roller_env.level.expand import coin_positions
+from roller_env.level.expand import expand
 from roller_env.replay.contents import Replay
 from roller_env.replay.playback import Playback
 
@@ -126,7 +126,7 @@ def _pictures(
 def _captions(replay: Replay) -> tuple[str, str]:
     level, result = replay.level, replay.result
     played = f"{replay.player or 'unknown player'}, {result.time_s:.1f} s to: {result.outcome}"
-    in_level = len(coin_positions(level)[0])
+    in_level = len(expand(level).coins)
     coins = f"{result.coins} of {in_level} coins ({result.score_percent:.0f} %)"
     preset = replay.options.physics.name
     return level.title or level.name, f"{played}, {coins}, level {level.name}, physics {preset}"

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from roller_env.game.actions import DIRECTIONS, forces
 from roller_env.game.observations import STATE_ENTRIES, layout
 from roller_env.level import Level
-from roller_env.level.expand import coin_positions
+from roller_env.level.expand import expand
 from roller_env.replay.contents import Replay
 from roller_env.replay.playback import Playback
 from roller_env.simulation import Simulation
@@ -207,7 +207,7 @@ def itinerary(level: Level) -> list[Stop]:
     if level.route is None:
         raise ValueError(f"level {level.name!r} has no route, which is what the player follows")
     route = np.array(level.route.points)
-    coins = np.array(coin_positions(level)[0]).reshape(-1, 3)
+    coins = expand(level).coins
     legs = np.array([_nearest_leg(coin, route) for coin in coins], dtype=np.int64)
     stops = [Stop(route[0])]
     for leg, (begin, end) in enumerate(itertools.pairwise(route)):

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.game.actions import forces
-from roller_env.level.expand import coin_positions
+from roller_env.level.expand import expand
 from roller_env.level.schema import Level
 from roller_env.training.files import RunError
 from roller_env.training.policy import Policy
@@ -94,7 +94,7 @@ class Evaluation:
     @property
     def coins_in_level(self) -> int:
         """As many as can be collected."""
-        return len(coin_positions(self.level)[0])
+        return len(expand(self.level).coins)
 
     def table(self) -> dict[str, Estimate]:
         """Return the measures by name, in the order in which they are shown."""

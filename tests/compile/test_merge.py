@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from roller_env.compile.merge import cover, merge_solids
-from roller_env.level.expand import Solid, rotation_matrix, solids
-from roller_env.level.schema import FloorPlan
+from roller_env.level.expand import expand
+from roller_env.pieces.floor import FloorPlan
+from roller_env.pieces.piece import Solid, rotation_matrix
 from tests.builders import make_level
 
 IDENTITY = rotation_matrix()
@@ -108,7 +109,7 @@ def plan(text: str, **options: object) -> FloorPlan:
 
 def merged_plan(*plans: FloorPlan) -> list[Solid]:
     level = make_level(floors=plans, materials={"ice": {}}, boxes=[], start={"at": (0.5, 0.5, 3.0)})
-    return merge_solids(solids(level))
+    return merge_solids(expand(level).ground)
 
 
 def test_a_floor_plan_of_one_material_is_one_box() -> None:

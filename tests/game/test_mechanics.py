@@ -13,7 +13,10 @@ import pytest
 
 from roller_env.game.rules import HANGING_S, INTRO_S
 from roller_env.level import Level
-from roller_env.level.schema import Ball, Gate, LiftPad, Plate
+from roller_env.level.schema import Ball
+from roller_env.pieces.gate import Gate
+from roller_env.pieces.lift_pad import LiftPad
+from roller_env.pieces.plate import Plate
 from tests.builders import BALL_RADIUS_M, GRAVITY, Game, coin, make_level, q, resting
 from tests.game.rails import Rails
 

@@ -14,7 +14,8 @@ from roller_env.game.state import GameState
 from roller_env.game.sweep import find_entries
 from roller_env.game.tables import Kind, LevelTable
 from roller_env.level import Level
-from roller_env.level.schema import COIN_REACH_M, PLATE_HIT_HEIGHT_M
+from roller_env.pieces.coin import COIN_REACH_M
+from roller_env.pieces.plate import PLATE_HIT_HEIGHT_M
 from tests.builders import BALL_RADIUS_M, Float64, Vector
 
 SUBSTEP_S = 1 / 240

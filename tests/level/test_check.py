@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 
 from roller_env.level import check_level, level_warnings, parse_level
-from roller_env.level.expand import TOUCHING_M
-from roller_env.level.schema import BUILT_IN_MATERIALS, MAX_PIECES, PLATE_HIT_HEIGHT_M
+from roller_env.level.schema import BUILT_IN_MATERIALS, MAX_PIECES
+from roller_env.pieces.piece import TOUCHING_M
+from roller_env.pieces.plate import PLATE_HIT_HEIGHT_M
 from roller_env.problems import FieldPath
 from roller_env.units import quants
 from tests.level.samples import COMPLETE, small_level

@@ -17,8 +17,8 @@ from roller_env.level import (
     parse_level,
     shipped_levels,
 )
-from roller_env.level.expand import TOUCHING_M
-from roller_env.level.schema import MAX_COINS
+from roller_env.pieces.coin import MAX_COINS
+from roller_env.pieces.piece import TOUCHING_M
 from roller_env.problems import FieldPath
 from tests.level.samples import SMALL, small_level
 from tests.level.test_check import GATE, LINKED, PLATE, RADIUS, _block, _floor, start_at

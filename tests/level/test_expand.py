@@ -8,14 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from roller_env.level.expand import COIN_HEIGHT_M, Solid, coin_positions, pad_groups, solids
+from roller_env.level.expand import expand
+from roller_env.pieces.floor import COIN_HEIGHT_M
+from roller_env.pieces.lift_pad import pad_groups
+from roller_env.pieces.piece import Solid
 from roller_env.yaml_tree import read_tree
 from tests.level.samples import small_level
 
 
 def expanded(**pieces: Any) -> tuple[Solid, ...]:
     """Return the solids of a level that has nothing but these pieces."""
-    return solids(small_level(**({"boxes": []} | pieces)))
+    return expand(small_level(**({"boxes": []} | pieces))).ground
 
 
 def inside(blocks: tuple[Solid, ...], *points: tuple[float, float, float]) -> list[bool]:
@@ -27,7 +30,8 @@ def test_up_the_page_is_forward_and_left_is_left() -> None:
     plan = {"corner": (10.0, 20.0, 3.0), "cell": 2.0, "thickness": 1.0, "plan": "#..\n..o\n"}
     blocks = expanded(floors=[plan])
     assert sorted(block.centre for block in blocks) == [(11.0, 21.0, 2.5), (13.0, 25.0, 2.5)]
-    positions, sources = coin_positions(small_level(boxes=[], floors=[plan]))
+    level = expand(small_level(boxes=[], floors=[plan]))
+    positions, sources = level.coins, level.coin_sources
     assert positions.tolist() == [[11.0, 21.0, 3.0 + COIN_HEIGHT_M]]
     assert sources == ("floors[0]",)
 
@@ -51,7 +55,8 @@ def test_a_blank_line_under_a_plan_belongs_to_it_if_yaml_says_so(
 
 def groups(*pads: tuple[float, float, float]) -> list[int]:
     """Return the groups of pads of one metre in length and width, 0.2 m high, by their centres."""
-    return pad_groups(small_level(lift_pads=[{"at": at, "size": (1.0, 1.0, 0.2)} for at in pads]))
+    level = small_level(lift_pads=[{"at": at, "size": (1.0, 1.0, 0.2)} for at in pads])
+    return pad_groups(level.lift_pads)
 
 
 def test_pads_that_overlap_or_touch_are_one_group_also_by_way_of_others() -> None:
@@ -69,7 +74,7 @@ def test_a_block_of_a_floor_stands_on_its_cell_and_carries_its_coin() -> None:
     slab, block = expanded(floors=[plan])
     assert (slab.material, block.material) == ("glass", "glass")
     assert (block.centre, block.half_size) == ((1.0, 1.0, 0.75), (1.0, 1.0, 0.75))
-    positions, _ = coin_positions(small_level(boxes=[], floors=[plan]))
+    positions = expand(small_level(boxes=[], floors=[plan])).coins
     assert positions[0, 2] == 1.5 + COIN_HEIGHT_M
 
 
@@ -143,7 +148,8 @@ def test_coins_come_in_lines_arcs_and_grids() -> None:
         {"arc": {"centre": (0, 0, 1), "radius": 2, "from_deg": 0, "to_deg": 90, "count": 2}},
         {"grid": {"centre": (10, 0, 1), "spacing": (2, 3), "count": (1, 2)}},
     ]
-    positions, sources = coin_positions(small_level(coins=shapes))
+    level = expand(small_level(coins=shapes))
+    positions, sources = level.coins, level.coin_sources
     assert positions == pytest.approx(
         np.array(
             [
@@ -156,6 +162,7 @@ def test_coins_come_in_lines_arcs_and_grids() -> None:
 
 
 def test_a_level_without_coins_has_none() -> None:
-    positions, sources = coin_positions(small_level())
+    level = expand(small_level())
+    positions, sources = level.coins, level.coin_sources
     assert positions.shape == (0, 3)
     assert sources == ()

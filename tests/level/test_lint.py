@@ -15,9 +15,9 @@ from roller_env.game.actions import KEY_FORCE_N
 from roller_env.level import Level, load_level, parse_level, shipped_levels
 from roller_env.level.lint import lint
 from roller_env.level.reach import Play, reach
-from roller_env.level.schema import Coins
 from roller_env.level.template import new_level
 from roller_env.physics.presets import PRESETS
+from roller_env.pieces.coin import Coins
 from roller_env.problems import FieldPath, Problem
 from roller_env.replay import frames, load_replay, shipped_replays
 from roller_env.units import quants

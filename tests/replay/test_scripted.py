@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roller_env.level import load_level, shipped_levels
-from roller_env.level.expand import coin_positions
+from roller_env.level.expand import expand
 from roller_env.replay import Versions, load_replay, record_episode, shipped_replays, verify
 from roller_env.replay.scripted import ScriptedPlayer, itinerary, meant, shortest_way
 from tests.builders import make_level
@@ -52,7 +52,7 @@ def test_the_plan_has_every_coin_once_and_the_route_in_its_order(level: str) -> 
     loaded = load_level(level)
     stops = itinerary(loaded)
     coins = [stop.coin for stop in stops if stop.coin is not None]
-    assert sorted(coins) == list(range(len(coin_positions(loaded)[0])))
+    assert sorted(coins) == list(range(len(expand(loaded).coins)))
     assert loaded.route is not None
     route = [tuple(stop.at) for stop in stops if stop.coin is None]
     assert route == list(loaded.route.points)

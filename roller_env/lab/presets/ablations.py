@@ -14,7 +14,7 @@ from roller_env.lab.presets.results import Games, costs
 from roller_env.lab.presets.setting import pair_with_ball, set_flag
 from roller_env.lab.table import Frame, frame
 from roller_env.level import Level, load_level
-from roller_env.level.expand import coin_positions, solids
+from roller_env.level.expand import expand
 from roller_env.physics.presets import PRESETS
 
 Change = Callable[[mujoco.MjSpec, Level], None]
@@ -35,7 +35,7 @@ def _unmerged(spec: mujoco.MjSpec, level: Level) -> None:
     """Have every box of the level and every cell of its floors be a geom."""
     merged = [geom for geom in spec.geoms if geom.name.startswith("solid_")]
     materials = {geom.name.split("_", 2)[2]: geom for geom in merged}
-    for number, solid in enumerate(solids(level)):
+    for number, solid in enumerate(expand(level).ground):
         like = materials[solid.material]
         quaternion = np.empty(4)
         mujoco.mju_mat2Quat(quaternion, np.array(solid.rotation).reshape(9))
@@ -89,7 +89,7 @@ def _movers(level: Level) -> list[str]:
 def _coins(as_geoms: bool) -> Change:
     def change(spec: mujoco.MjSpec, level: Level) -> None:
         radius = level.ball.radius / 2
-        for number, coin in enumerate(coin_positions(level)[0]):
+        for number, coin in enumerate(expand(level).coins):
             if as_geoms:
                 spec.worldbody.add_geom(
                     name=f"coin_{number}",

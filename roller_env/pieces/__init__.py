@@ -1,0 +1,1 @@
+"""Every kind of piece that a level can have: one module each."""

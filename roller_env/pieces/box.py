@@ -1,0 +1,26 @@
+"""A solid box."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pydantic import Field
+
+from roller_env.pieces.fields import Degrees, Name, Point, Size
+from roller_env.pieces.piece import Piece, Solid, half_of, rotation_matrix
+
+
+class Box(Piece):
+    """A solid box. Rotated about its centre: first pitch (about y), then yaw (about z)."""
+
+    at: Point = Field(description="Centre of the box.")
+    size: Size = Field(description="Full edge lengths along its own x, y and z.")
+    yaw_deg: Degrees = Field(0.0, description="Positive turns +x towards +y (to the left).")
+    pitch_deg: Degrees = Field(0.0, description="Positive tips the +x end down.")
+    material: str = "default"
+    name: Name | None = None
+
+    def solids(self, source: str) -> Iterator[Solid]:
+        """Yield itself."""
+        rotation = rotation_matrix(self.yaw_deg, self.pitch_deg)
+        yield Solid(self.at, half_of(self.size), rotation, self.material, source)

@@ -1,0 +1,101 @@
+"""Coins, one by one or in rows."""
+
+from __future__ import annotations
+
+from typing import Annotated, Final
+
+import numpy as np
+from pydantic import ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from roller_env.pieces.fields import Degrees, Part, PlanePoint, Point, PositiveLength
+from roller_env.pieces.piece import Float64, Piece
+from roller_env.units import quants
+
+COIN_REACH_M: Final = quants(30.0)
+"""A coin is collected when the ball's centre is this near to it (`collect`)."""
+
+MAX_COINS: Final = 10_000
+
+
+class CoinLine(Part):
+    """Coins at equal distances on a straight line, both ends included."""
+
+    start: Point
+    end: Point
+    count: Annotated[int, Field(strict=True, ge=2, le=MAX_COINS)]
+
+
+class CoinArc(Part):
+    """Coins at equal angles on a level arc, both ends included."""
+
+    centre: Point
+    radius: PositiveLength
+    from_deg: Degrees = Field(description="Angle of the first coin, from +x towards +y.")
+    to_deg: Degrees = Field(description="Angle of the last coin.")
+    count: Annotated[int, Field(strict=True, ge=2, le=MAX_COINS)]
+
+
+class CoinGrid(Part):
+    """Coins in level rows and columns round a centre."""
+
+    centre: Point
+    spacing: PlanePoint = Field(description="Distance between neighbours along x and y.")
+    count: tuple[
+        Annotated[int, Field(strict=True, ge=1, le=MAX_COINS)],
+        Annotated[int, Field(strict=True, ge=1, le=MAX_COINS)],
+    ] = Field(description="Coins along x and along y.")
+
+    @model_validator(mode="after")
+    def _is_bounded(self) -> CoinGrid:
+        if self.count[0] * self.count[1] > MAX_COINS:
+            raise PydanticCustomError(
+                "too_many_coins", "a grid may hold at most {limit} coins", {"limit": MAX_COINS}
+            )
+        return self
+
+
+class Coins(Piece):
+    """One coin (``at``), or a ``line``, ``arc`` or ``grid`` of them: exactly one of the four."""
+
+    model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
+
+    at: Point | None = None
+    line: CoinLine | None = None
+    arc: CoinArc | None = None
+    grid: CoinGrid | None = None
+
+    @model_validator(mode="after")
+    def _exactly_one(self) -> Coins:
+        given = [key for key in ("at", "line", "arc", "grid") if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise PydanticCustomError(
+                "coins_ambiguous",
+                "give exactly one of at, line, arc, grid; found {given}",
+                {"given": ", ".join(given) or "none"},
+            )
+        return self
+
+    def coins(self) -> Float64:
+        """Return them in their order."""
+        if self.at is not None:
+            return np.array([self.at])
+        if self.line is not None:
+            line: Float64 = np.linspace(self.line.start, self.line.end, self.line.count)
+            return line
+        if self.arc is not None:
+            arc = self.arc
+            angles = np.radians(np.linspace(arc.from_deg, arc.to_deg, arc.count))
+            ring = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
+            circle: Float64 = np.array(arc.centre) + arc.radius * ring
+            return circle
+        assert self.grid is not None, "Coins holds exactly one of its four shapes"
+        grid = self.grid
+        along = [
+            (np.arange(n) - (n - 1) / 2) * gap
+            for n, gap in zip(grid.count, grid.spacing, strict=True)
+        ]
+        xs, ys = np.meshgrid(*along, indexing="ij")
+        offsets = np.stack([xs, ys, np.zeros_like(xs)], -1).reshape(-1, 3)
+        rows: Float64 = np.array(grid.centre) + offsets
+        return rows

@@ -1,0 +1,60 @@
+"""A pad that throws the ball up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from roller_env.pieces.fields import Name, Number, Point, Seconds, Size
+from roller_env.pieces.piece import TOUCHING_M, UNTURNED, Piece, Region, Solid, half_of
+from roller_env.units import quants
+
+
+class LiftPad(Piece):
+    """A solid pad that throws whatever enters it upwards with a steady force for a while."""
+
+    at: Point
+    size: Size
+    force_n: Annotated[Number, Field(gt=0.0, le=1e6)] = Field(
+        quants(500.0), description="Newtons upwards; more than the ball's weight."
+    )
+    duration_s: Seconds = Field(5.0, description="How long it pushes, once entered.")
+    name: Name | None = None
+
+    def solids(self, source: str) -> Iterator[Solid]:
+        """Yield itself."""
+        yield Solid(self.at, half_of(self.size), UNTURNED, "", source)
+
+    def region(self, touch: float) -> Region:
+        """Return where the ball touches it."""
+        return Region(self.at, half_of(self.size), touch)
+
+
+def pad_groups(pads: Sequence[LiftPad]) -> list[int]:
+    """Return, for each lift pad, the number of the first pad of those that push as one with it.
+
+    Pads that overlap or touch, if only by way of others between them, are one pad to the ball.
+    """
+    middle = np.array([pad.at for pad in pads]).reshape(-1, 3)
+    half = np.array([pad.size for pad in pads]).reshape(-1, 3) / 2
+    low, high = middle - half, middle + half + TOUCHING_M
+    first = list(range(len(pads)))
+    in_x = np.argsort(low[:, 0], kind="stable")
+    for place, number in enumerate(in_x.tolist()):
+        beside = in_x[place + 1 : np.searchsorted(low[in_x, 0], high[number, 0], "right")]
+        near = (low[beside] <= high[number]) & (low[number] <= high[beside])
+        for other in beside[near.all(axis=1)].tolist():
+            one, two = sorted((_root(first, number), _root(first, other)))
+            first[two] = one
+    return [_root(first, number) for number in range(len(pads))]
+
+
+def _root(first: list[int], number: int) -> int:
+    """Follow ``first`` to a number that is its own, and shorten the way for the next time."""
+    while first[number] != number:
+        first[number] = first[first[number]]
+        number = first[number]
+    return number

@@ -1,0 +1,136 @@
+"""What every kind of piece is to the rest of the house: its shapes, as plain data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.pieces.fields import Part
+
+Float64 = npt.NDArray[np.float64]
+Matrix = tuple[tuple[float, float, float], ...]
+Vector = tuple[float, float, float]
+
+TOUCHING_M: Final = 0.001
+"""Things that are this near to each other touch, and one may reach this deep into another: covers
+rounded numbers in files and the depth to which a resting ball sinks into MuJoCo's soft contacts."""
+
+UNTURNED: Final[Matrix] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """A box that stands still.
+
+    Attributes:
+        centre: world frame, metres.
+        half_size: half edge lengths along its own axes, metres.
+        rotation: box frame to world frame, 3x3, row major.
+        material: name of its material; empty: one whose factors are all 1.
+        source: the piece of the level it comes from, as a path such as ``floors[0]``.
+    """
+
+    centre: Vector
+    half_size: Vector
+    rotation: Matrix
+    material: str
+    source: str
+
+    @property
+    def axis_aligned(self) -> bool:
+        """Whether its edges lie along the world's axes."""
+        return self.rotation == UNTURNED
+
+    def contains(self, points: Float64, margin: float = 0.0) -> npt.NDArray[np.bool_]:
+        """Say which of ``points``, (n, 3) in metres, lie inside or within ``margin`` of it.
+
+        With a ``margin`` below zero, which lie inside and that deep under each face.
+        """
+        local = (points - np.array(self.centre)) @ np.array(self.rotation)
+        half = np.maximum(np.array(self.half_size) + min(margin, 0.0), 0.0)
+        outside = np.maximum(np.abs(local) - half, 0.0)
+        inside: npt.NDArray[np.bool_] = (outside**2).sum(axis=-1) <= max(margin, 0.0) ** 2
+        return inside
+
+
+@dataclass(frozen=True, slots=True)
+class Mover:
+    """A solid slab that goes down along a line and stops there.
+
+    Attributes:
+        name: of the piece.
+        solid: where it is at the start.
+        stop: height at which its centre has arrived, metres.
+        speed: m/s, downwards.
+    """
+
+    name: str
+    solid: Solid
+    stop: float
+    speed: float
+
+
+class Region(NamedTuple):
+    """Where something happens to the ball: a rounded box, above a floor.
+
+    Attributes:
+        centre: metres, world frame.
+        half: half edges of the box, along the world's axes, metres.
+        radius: of the rounding, metres: the ball's centre is as near as that to the box.
+        floor: least height of the ball's centre over the region's.
+    """
+
+    centre: Vector
+    half: Vector
+    radius: float
+    floor: float = -math.inf
+
+
+class Piece(Part):
+    """A kind of thing of which a level has any number, each in the field of its kind.
+
+    What a kind does not have it leaves as it is here: nothing.
+    """
+
+    def solids(self, source: str) -> Iterator[Solid]:
+        """Yield what of it is solid and stands still.
+
+        Args:
+            source: its path in the level, such as ``floors[0]``.
+        """
+        yield from ()
+
+    def coins(self) -> Float64:
+        """Return the centres of its coins, (n, 3) metres, world frame."""
+        return np.zeros((0, 3))
+
+    def mover(self, source: str) -> Mover | None:
+        """Return what of it is solid and moves."""
+        return None
+
+    def region(self, touch: float) -> Region | None:
+        """Return where it acts on the ball.
+
+        Args:
+            touch: distance of the ball's centre from a surface that it touches, metres.
+        """
+        return None
+
+
+def rotation_matrix(yaw_deg: float = 0.0, pitch_deg: float = 0.0) -> Matrix:
+    """Return the matrix of a pitch about y followed by a yaw about z, box to world frame."""
+    if yaw_deg == 0.0 and pitch_deg == 0.0:
+        return UNTURNED
+    yaw, pitch = math.radians(yaw_deg), math.radians(pitch_deg)
+    cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
+    return ((cy * cp, -sy, cy * sp), (sy * cp, cy, sy * sp), (-sp, 0.0, cp))
+
+
+def half_of(size: Vector) -> Vector:
+    """Return the half edges of a box of ``size``."""
+    return (size[0] / 2, size[1] / 2, size[2] / 2)

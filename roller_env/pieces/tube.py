@@ -1,0 +1,99 @@
+"""A transparent pipe."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from roller_env.pieces.fields import (
+    MIN_LENGTH_M,
+    Degrees,
+    Name,
+    Number,
+    Part,
+    Point,
+    PositiveLength,
+)
+from roller_env.pieces.piece import Float64, Piece, Solid
+from roller_env.units import quants
+
+
+class Opening(Part):
+    """A slot along the whole length of a tube."""
+
+    toward_deg: Degrees = Field(
+        description="Direction of its middle: for an upright tube the compass angle from +x to "
+        "+y; for a lying one the angle from straight up."
+    )
+    width_deg: Annotated[Number, Field(gt=0.0, lt=360.0)] = Field(
+        description="Panels whose middle lies within half of this are left out."
+    )
+
+
+class Tube(Piece):
+    """A transparent pipe of flat panels that the ball rolls or rises inside."""
+
+    start: Point = Field(description="Middle of the pipe's one end.")
+    end: Point = Field(description="Middle of its other end.")
+    inner_radius: PositiveLength = Field(description="From its axis to the middle of a panel.")
+    thickness: PositiveLength = quants(4.0)
+    sides: Annotated[int, Field(strict=True, ge=3, le=64)] = Field(
+        16, description="Number of flat panels around it."
+    )
+    opening: Opening | None = None
+    material: str = "glass"
+    name: Name | None = None
+
+    @model_validator(mode="after")
+    def _has_length(self) -> Tube:
+        if math.dist(self.start, self.end) < MIN_LENGTH_M:
+            raise PydanticCustomError("tube_without_length", "start and end must differ")
+        return self
+
+    @property
+    def frame(self) -> Float64:
+        """Its axes, (3, 3), columns: angle zero, angle 90 degrees, along the pipe.
+
+        Angles count from +x towards +y for an upright tube, from straight up for a lying one.
+        """
+        axis = np.subtract(self.end, self.start)
+        axis /= np.linalg.norm(axis)
+        upright = abs(axis[2]) > 0.999
+        reference = np.array([1.0, 0.0, 0.0]) if upright else np.array([0.0, 0.0, 1.0])
+        zero = reference - axis * (axis @ reference)
+        zero /= np.linalg.norm(zero)
+        quarter = np.cross(axis, zero)
+        if upright and axis[2] < 0.0:
+            quarter = -quarter
+        return np.stack([zero, quarter, axis], axis=1)
+
+    def solids(self, source: str) -> Iterator[Solid]:
+        """Yield the panels that the opening leaves."""
+        frame = self.frame
+        middle = (np.array(self.start) + np.array(self.end)) / 2
+        half_length = math.dist(self.start, self.end) / 2
+        step = 2.0 * math.pi / self.sides
+        outer = self.inner_radius + self.thickness
+        half_width = outer * math.tan(step / 2)
+        for side in range(self.sides):
+            angle = side * step
+            if self.opening is not None:
+                away = (math.degrees(angle) - self.opening.toward_deg + 180.0) % 360.0 - 180.0
+                if abs(away) < self.opening.width_deg / 2:
+                    continue
+            out = frame[:, 0] * math.cos(angle) + frame[:, 1] * math.sin(angle)
+            along = np.cross(frame[:, 2], out)
+            centre = middle + out * (self.inner_radius + self.thickness / 2)
+            rotation = np.stack([out, along, frame[:, 2]], axis=1)
+            yield Solid(
+                (float(centre[0]), float(centre[1]), float(centre[2])),
+                (self.thickness / 2, half_width, half_length),
+                tuple((float(r[0]), float(r[1]), float(r[2])) for r in rotation),
+                self.material,
+                source,
+            )
