@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar, cast
 
@@ -34,27 +35,50 @@ def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
     return cast("Callable[_P, _R]", _dispatcher(function))
 
 
-def compiled_with_package(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Return ``function`` compiled as `compiled` does, to run without Python's lock.
+def compiled_with_packages(
+    *others: str, makes_arrays: bool = True
+) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
+    """Return a decorator that compiles as `compiled` does, to run without Python's lock.
 
-    It may use functions and constants of all modules in its own directory: what was kept of it is
-    compiled anew when any of them has changed.
+    The function may use functions and constants of all modules in its own directory, and in those
+    of the packages ``others``: what was kept of it is compiled anew when any of them has changed.
+    One that does not make arrays consists of `part`s.
     """
-    dispatcher = _dispatcher(function, nogil=True)
-    file = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
-    if file is not None:
-        # Of the function's own file, as Numba has it; it has no name for a stamp of several.
-        file._source_stamp = _stamp(Path(function.__code__.co_filename).parent)
+
+    def decorate(function: Callable[_P, _R]) -> Callable[_P, _R]:
+        dispatcher = _dispatcher(function, nogil=True, _nrt=makes_arrays)
+        file = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+        if file is not None:
+            # Of the function's own file, as Numba has it; it has no name for a stamp of several.
+            packages = [Path(str(import_module(name).__file__)) for name in others]
+            files = [Path(function.__code__.co_filename), *packages]
+            file._source_stamp = tuple(_stamp(file.parent) for file in files)
+        return cast("Callable[_P, _R]", dispatcher)
+
+    return decorate
+
+
+compiled_with_package = compiled_with_packages()
+"""Decorates a function that uses those of its own directory alone."""
+
+
+def part(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Return ``function`` compiled as part of the kernels that use it, and kept with them.
+
+    It makes no arrays. So Numba need not count who holds the dozens that are handed from one to the
+    other, which took longer than all that is computed; and a graphics card could run it.
+    """
+    dispatcher = numba.njit(nogil=True, error_model="numpy", _nrt=False)(function)
     return cast("Callable[_P, _R]", dispatcher)
 
 
-def _dispatcher(function: Callable[..., Any], *, nogil: bool = False) -> Any:
+def _dispatcher(function: Callable[..., Any], **options: bool) -> Any:
     try:
-        return numba.njit(cache=True, nogil=nogil, error_model="numpy")(function)
+        return numba.njit(cache=True, error_model="numpy", **options)(function)
     except RuntimeError:
         # Nowhere to write: neither beside the package nor in the user's cache directory.
         _WAIT.kept = False
-        return numba.njit(nogil=nogil, error_model="numpy")(function)
+        return numba.njit(error_model="numpy", **options)(function)
 
 
 @cache

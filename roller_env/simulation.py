@@ -5,34 +5,28 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from roller_env import checks
+from roller_env.arrays import Bool, Float32, Float64, Int64
 from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.config import MAX_ENVS, EnvConfig
 from roller_env.divergence import report
-from roller_env.game import observations, rewards, rules, sweep
-from roller_env.game.slabs import Bodies
+from roller_env.game import observations, step
+from roller_env.game.bodies import Bodies, Controls
 from roller_env.game.state import GameState, score_percent
+from roller_env.game.step import Game, Reward
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level, load_level
 from roller_env.level.check import obstacles, obstructions
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.physics.stepper import Stepper
+from roller_env.pieces.coin import COIN
 from roller_env.pieces.fields import MAX_COORDINATE_M
 from roller_env.pieces.piece import Solid
-
-Float32 = npt.NDArray[np.float32]
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
-Int64 = npt.NDArray[np.int64]
-
-
-_VIEWS_KEPT: Final = 64
-"""Numbers of rows whose views of the level data are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +39,7 @@ class Snapshot:
     Attributes:
         level: what is played.
         physics: (n, nstate) float64, MuJoCo's integration state.
-        game: the arrays of `GameState`.
+        game: the rules', the cameras' and the shaping's.
         level_of_row: (n,) which level each row plays.
         generators: the random generators' states.
         preset: the physics settings.
@@ -54,7 +48,7 @@ class Snapshot:
 
     level: Level
     physics: Float64
-    game: dict[str, npt.NDArray[Any]]
+    game: GameState
     level_of_row: Int64
     generators: tuple[dict[str, Any], ...]
     preset: PhysicsPreset
@@ -74,7 +68,7 @@ class Snapshot:
         return replace(
             self,
             physics=self.physics[numbers],
-            game={name: values[numbers] for name, values in self.game.items()},
+            game=self.game.copy_rows(numbers),
             level_of_row=self.level_of_row[numbers],
             generators=tuple(self.generators[row] for row in numbers),
         )
@@ -155,23 +149,35 @@ class Simulation:
         """Make the games of which no episode has begun, from what cannot be computed anew."""
         config, num_envs = self.config, self.num_envs
         self._duration_s = config.substeps * self.compiled.preset.dt_s
-        self._levels = LevelTable.of([self.compiled.level])
-        self._level_of_row = np.zeros(num_envs, dtype=np.int64)
-        self._views: dict[int, LevelTable] = {}
-        self.table = self._levels.for_rows(self._level_of_row)
-        self.state = GameState.initial(self.table)
-        # No episode has begun, so that there is nothing to step before the first reset.
-        self.state.truncated[:] = True
+        self.table = LevelTable.of_levels([self.compiled.level])
+        level_of = np.zeros(num_envs, dtype=np.int64)
+        self._game = Game.of(self.table, level_of, self._episode_lengths(level_of))
+        self.state = self._game.state
         self._stepper = Stepper(self.compiled.model, num_envs, config.substeps, config.num_threads)
-        self._potential = np.zeros(num_envs)
-        self._max_steps = self._episode_lengths()
+        self._bodies, self._controls = self._views()
+        self._reward = Reward(
+            config.reward_weights.terms, config.reward == "shaped", config.discount
+        )
+        self._every = np.arange(num_envs)
         self._ray_directions = observations.ray_directions()
         self._scan_offsets = observations.scan_offsets()
-        ball, velocity = self.compiled.ball_qpos, self.compiled.ball_qvel
-        self._position = self._stepper.qpos[:, ball : ball + 3]
-        self._orientation = self._stepper.qpos[:, ball + 3 : ball + 7]
-        self._velocity = self._stepper.qvel[:, velocity : velocity + 3]
-        self._spin = self._stepper.qvel[:, velocity + 3 : velocity + 6]
+
+    def _views(self) -> tuple[Bodies, Controls]:
+        """Return what the rules know of the physics, as views of its arrays.
+
+        MuJoCo numbers joints and actuators in the order in which the level's spec adds them: the
+        ball's, then those of the plates and of the gates.
+        """
+        physics, ball, motion = self._stepper, self.compiled.ball_qpos, self.compiled.ball_qvel
+        bodies = Bodies(
+            position=physics.qpos[:, ball : ball + 3],
+            orientation=physics.qpos[:, ball + 3 : ball + 7],
+            velocity=physics.qvel[:, motion : motion + 3],
+            angular_velocity=physics.qvel[:, motion + 3 : motion + 6],
+            displacement=physics.qpos[:, ball + 7 :],
+            aim=physics.act[:, :],
+        )
+        return bodies, Controls(force_n=physics.ctrl[:, :3], velocity=physics.ctrl[:, 3:])
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a copy is made of; it goes on with the same bits, and on its own.
@@ -205,22 +211,22 @@ class Simulation:
     @property
     def ball_position(self) -> Float64:
         """(N, 3) copy of the ball centres, metres, world frame."""
-        return self._position.copy()
+        return self._bodies.position.copy()
 
     @property
     def ball_velocity(self) -> Float64:
         """(N, 3) copy of the ball centres' velocities, m/s, world frame."""
-        return self._velocity.copy()
+        return self._bodies.velocity.copy()
 
     @property
     def ball_orientation(self) -> Float64:
         """(N, 4) copy of the balls' orientations, quaternions w, x, y, z from ball to world."""
-        return self._orientation.copy()
+        return self._bodies.orientation.copy()
 
     @property
     def ball_angular_velocity(self) -> Float64:
         """(N, 3) copy of the balls' angular velocities, rad/s, in each ball's own frame."""
-        return self._spin.copy()
+        return self._bodies.angular_velocity.copy()
 
     @property
     def plate_displacement(self) -> Float64:
@@ -243,6 +249,11 @@ class Simulation:
         return self.state.steps.astype(np.float64) * self.duration_s
 
     @property
+    def coins_in_level(self) -> Int64:
+        """(N,) how many coins each env's level has."""
+        return self.table.of(COIN).total[self._game.level_of]
+
+    @property
     def generators(self) -> tuple[np.random.Generator, ...]:
         """The random generator of each row."""
         return tuple(self._generators)
@@ -255,10 +266,10 @@ class Simulation:
         ``diverged``.
         """
         every: Int64 | slice = slice(None) if rows is None else rows
-        coins, finished = self.state.points[every], self.state.finished[every]
+        coins, finished = self.state.coins[every], self.state.finished[every]
         return {
             "success": finished.copy(),
-            "score_percent": score_percent(coins, self.table.coin_count[every], finished),
+            "score_percent": score_percent(coins, self.coins_in_level[every], finished),
             "coins": coins.copy(),
             "time_s": self.time_s[every],
             "fall": self.state.fallen[every].copy(),
@@ -285,8 +296,9 @@ class Simulation:
 
         Args:
             rows: (n,) row indices.
-            intro: whether the ball hangs still for `rules.HANGING_S` and the keys work only after
-                `rules.INTRO_S`, as when the game is started; after a fall it goes on at once.
+            intro: whether the ball hangs still for `roller_env.game.step.HANGING_S` and the keys
+                work only after `INTRO_S`, as when the game is started; after a fall it goes on at
+                once.
             placement: of the n balls, from `placement`; the rows' generators draw the same numbers
                 with one as without.
 
@@ -299,19 +311,20 @@ class Simulation:
         # In order, as the physics asks for them; every row has its own generator.
         order = np.argsort(rows)
         rows = rows[order]
-        table = self._table_of(rows)
+        level = self._game.level_of[rows]
         self._stepper.reset(rows)
         jitter = np.array([self._generators[row].uniform(-1.0, 1.0, 2) for row in rows])
-        start = table.start.copy()
-        start[:, :2] += jitter * table.jitter
-        self._position[rows] = start
-        fresh = GameState.initial(table)
+        start = self.table.start[level]
+        start[:, :2] += jitter * self.table.jitter[level]
+        self._bodies.position[rows] = start
+        fresh = GameState.initial(self.table, len(rows))
         if intro:
-            fresh.control_delay_s[:] = rules.INTRO_S
-        self.state.set_rows(rows, fresh.copy_rows())
+            fresh.control_delay_s[:] = step.INTRO_S
+        self.state.set_rows(rows, fresh)
         if placement is not None:
             self._place(rows, placement.take(order))
-        self._measure_potential(rows)
+        follows = placement is not None and placement.position is not None
+        self._measure_potential(rows, np.full(len(rows), follows))
 
     def placement(
         self,
@@ -361,17 +374,16 @@ class Simulation:
     def _place(self, rows: Int64, placement: Placement) -> None:
         """Put the balls of rows that were just reset where a placement says."""
         if placement.position is not None:
-            self._position[rows] = placement.position
+            self._bodies.position[rows] = placement.position
         if placement.velocity is not None:
-            self._velocity[rows] = placement.velocity
+            self._bodies.velocity[rows] = placement.velocity
         if placement.angular_velocity is not None:
             # The ball's own frame, in which MuJoCo has it, is still the world's.
-            self._spin[rows] = placement.angular_velocity
+            self._bodies.angular_velocity[rows] = placement.angular_velocity
         if placement.coin_left is not None:
-            self.state.coin_taken[rows] = ~placement.coin_left
-            self.state.points[rows] = (~placement.coin_left).sum(axis=1)
-        if placement.position is not None:
-            self._follow_route(rows)
+            coins = self.state.of(COIN)
+            coins.taken[rows] = ~placement.coin_left
+            coins.collected[rows] = (~placement.coin_left).sum(axis=1)
 
     def step(self, force_n: Float64, hold: Bool | None = None) -> Transition:
         """Advance every game that is not over by one control step.
@@ -387,61 +399,35 @@ class Simulation:
         if force_n.shape != (self.num_envs, 2):
             raise ValueError(f"force_n: found shape {force_n.shape}; must be ({self.num_envs}, 2)")
         idle = self.state.over if hold is None else self.state.over | hold
-        if not idle.any():
-            reward = self._step_rows(None, self.state, self.table, force_n)
-        else:
-            reward = np.zeros(self.num_envs)
-            rows = np.flatnonzero(~idle)
-            if len(rows):
-                part = GameState(**self.state.copy_rows(rows))
-                table = self._table_of(rows)
-                reward[rows] = self._step_rows(rows, part, table, force_n[rows])
-                self.state.set_rows(rows, part.copy_rows())
+        rows = np.flatnonzero(~idle) if idle.any() else None
+        reward = np.zeros(self.num_envs)
+        if rows is None or len(rows):
+            self._step_rows(rows, force_n)
+            every: Int64 | slice = slice(None) if rows is None else rows
+            reward[every] = self._game.step.reward[every]
         return Transition(
             reward, self.state.terminated, self.state.truncated.copy(), np.logical_not(idle)
         )
 
-    def _step_rows(
-        self, rows: Int64 | None, state: GameState, table: LevelTable, force_n: Float64
-    ) -> Float64:
-        """Step ``rows`` (None: all), whose state and level data are given; return the rewards."""
+    def _step_rows(self, rows: Int64 | None, force_n: Float64) -> None:
+        """Step ``rows``; None: all."""
         every: Int64 | slice = slice(None) if rows is None else rows
+        envs = self._every if rows is None else rows
         before = self._stepper.state[every].copy()
-        bodies = self._bodies(every) if rules.anything_moves(state) else None
-        controls = rules.controls(state, table, force_n, bodies, self.duration_s)
-        self._set_controls(every, controls)
-        hanging = controls.hanging_s if controls.hanging_s.any() else None
-        path = self._stepper.advance(rows) if hanging is None else self._let_go(rows, hanging)
+        step.prepare(self._game, envs, self.duration_s, force_n, self._bodies, self._controls)
+        hanging = self._game.step.hanging_s[every]
+        path = self._let_go(rows, hanging) if hanging.any() else self._stepper.advance(rows)
         diverged = self._stepper.diverged()[every] | ~np.isfinite(path[:, -1]).all(axis=1)
         if diverged.any():
-            self._end_diverged(every, diverged, path, before, table)
-            state.diverged |= diverged
+            self._end_diverged(envs[diverged], path, diverged, before)
         ball = self.compiled.ball_qpos
-        motion = sweep.Motion(
-            ball=path[:, :, ball : ball + 3],
-            plate=path[:, -1, self.compiled.plate_qpos],
-            duration_s=self.duration_s,
-        )
-        events = sweep.find_events(state, table, motion)
-        if hanging is not None:
-            sweep.forget(events, hanging > self.duration_s - 1e-9)
-        reward = rewards.points_reward(events, self.config.reward_weights)
-        rules.apply(state, table, motion, events)
-        state.truncated = ~state.terminated & (state.steps >= self._max_steps[every])
-        if self.config.reward == "shaped":
-            reward += self._shaping(every, state, table, motion.ball[:, -1])
-        return reward
-
-    def _bodies(self, rows: Int64 | slice) -> Bodies:
-        """Return where the ball and the slabs of ``rows`` are; copies, alike to the compiler."""
-        qpos, act, compiled = self._stepper.qpos[rows], self._stepper.act[rows], self.compiled
-        return Bodies(
-            ball=self._position[rows].copy(),
-            velocity=self._velocity[rows].copy(),
-            plate=qpos[:, compiled.plate_qpos].copy(),
-            gate=qpos[:, compiled.gate_qpos].copy(),
-            plate_aim=act[:, compiled.plate_act].copy(),
-            gate_aim=act[:, compiled.gate_act].copy(),
+        step.conclude(
+            self._game,
+            envs,
+            self.duration_s,
+            path[:, :, ball : ball + 3],
+            self._bodies.displacement,
+            self._reward,
         )
 
     def _let_go(self, rows: Int64 | None, hanging_s: Float64) -> Float64:
@@ -449,55 +435,28 @@ class Simulation:
         still = np.rint(hanging_s / self.compiled.preset.dt_s).astype(np.int64)
         return self._stepper.advance_late(rows, np.minimum(still, self._stepper.substeps))
 
-    def _set_controls(self, rows: Int64 | slice, controls: rules.Controls) -> None:
-        ctrl = np.empty((len(controls.force_n), self._stepper.ctrl.shape[1]))
-        ctrl[:, self.compiled.force_ctrl] = controls.force_n
-        ctrl[:, self.compiled.plate_ctrl] = controls.plate_velocity
-        ctrl[:, self.compiled.gate_ctrl] = controls.gate_velocity
-        self._stepper.ctrl[rows] = ctrl
+    def _measure_potential(self, rows: Int64, follows: Bool) -> None:
+        """Set the potential of rows whose ball was put somewhere.
 
-    def _shaping(
-        self, rows: Int64 | slice, state: GameState, table: LevelTable, ball: Float64
-    ) -> Float64:
-        """Return the shaping reward of the rows' step, and remember the new potential."""
-        rewards.follow_route(state, table, ball)
-        weight = self.config.reward_weights.progress
-        potential = weight * rewards.route_progress(state, table, ball)
-        shaping = rewards.shaping(
-            self._potential[rows], potential, state.terminated, self.config.discount
-        )
-        self._potential[rows] = potential
-        return shaping
+        Args:
+            rows: (n,).
+            follows: (n,) whether the route up to where the ball is counts as passed.
+        """
+        if self._reward.shaped and len(rows):
+            weight = self.config.reward_weights.progress
+            step.follow_route(self._game, rows, self._bodies.position, follows, weight)
 
-    def _follow_route(self, rows: Int64) -> None:
-        """Count the route up to where the balls of ``rows`` are as passed."""
-        if self.config.reward == "shaped" and len(rows):
-            part = GameState(**self.state.copy_rows(rows))
-            rewards.follow_route(part, self._table_of(rows), self._position[rows])
-            self.state.waypoint[rows] = part.waypoint
-
-    def _measure_potential(self, rows: Int64) -> None:
-        """Set the potential of rows whose state was replaced."""
-        if self.config.reward != "shaped":
-            return
-        part = GameState(**self.state.copy_rows(rows))
-        table = self._table_of(rows)
-        progress = rewards.route_progress(part, table, self._position[rows])
-        self._potential[rows] = self.config.reward_weights.progress * progress
-
-    def _end_diverged(
-        self,
-        every: Int64 | slice,
-        diverged: Bool,
-        path: Float64,
-        before: Float64,
-        table: LevelTable,
-    ) -> None:
-        """Report what diverged, and put those rows' physics back to the start, where it is finite.
+    def _end_diverged(self, rows: Int64, path: Float64, diverged: Bool, before: Float64) -> None:
+        """Report the rows that diverged, and put their physics back to where it is finite.
 
         Their games are over, so nothing reads the physics but the last observation.
+
+        Args:
+            rows: (m,) which.
+            path: (n, S + 1, nq) of the n rows that were stepped.
+            diverged: (n,) which of those are ``rows``.
+            before: (n, nstate) physics before the step.
         """
-        rows = np.arange(self.num_envs)[every][diverged]
         self.divergences += len(rows)
         kept = report(self.compiled, before[diverged], self._stepper.ctrl[rows])
         warnings.warn(
@@ -507,8 +466,9 @@ class Simulation:
             stacklevel=4,
         )
         self._stepper.reset(rows)
-        self._position[rows] = table.start[diverged]
+        self._bodies.position[rows] = self.table.start[self._game.level_of[rows]]
         path[diverged] = self._stepper.qpos[rows][:, None, :]
+        self.state.diverged[rows] = True
 
     # What is seen ----------------------------------------------------------------------------
 
@@ -517,36 +477,27 @@ class Simulation:
 
         They are laid out as `roller_env.game.observations.entries` of the configured mode says.
         """
-        every: Int64 | slice = slice(None) if rows is None else rows
-        if rows is None:
-            state, table = self.state, self.table
-        else:
-            state = GameState(**self.state.copy_rows(rows))
-            table = self._table_of(rows)
-        ball = observations.BallState(
-            # Copies, so that all rows and some of them are alike to the compiler.
-            position=self._position[every].copy(),
-            velocity=self._velocity[every].copy(),
-            orientation=self._orientation[every].copy(),
-            spin=self._spin[every].copy(),
-            gate=self._stepper.qpos[every][:, self.compiled.gate_qpos].copy(),
-        )
-        vector = observations.state_observation(ball, state, table, self._max_steps[every])
-        if self.config.observation != "rays":
-            return vector
-        return np.concatenate([vector, self._cast_rays(rows, ball.position, table)], axis=1)
+        envs = self._every if rows is None else np.asarray(rows)
+        size = sum(entry.size for entry in observations.entries(self.config.observation))
+        out = np.zeros((len(envs), size), dtype=np.float32)
+        step.observe(self._game, envs, self._bodies, out)
+        if self.config.observation == "rays":
+            out[:, observations.STATE_SIZE :] = self._cast_rays(rows, envs)
+        return out
 
-    def _cast_rays(self, rows: Int64 | None, ball: Float64, table: LevelTable) -> Float32:
-        body = self.compiled.ball_body
+    def _cast_rays(self, rows: Int64 | None, envs: Int64) -> Float32:
+        ball, body = self._bodies.position[envs], self.compiled.ball_body
         level_origins = np.broadcast_to(ball[:, None, :], (len(ball), len(self._ray_directions), 3))
         level_rays = self._stepper.rays(level_origins, self._ray_directions, body, rows)
         down = np.broadcast_to([0.0, 0.0, -1.0], self._scan_offsets.shape)
         scan = self._stepper.rays(ball[:, None, :] + self._scan_offsets, down, body, rows)
-        return observations.ray_observation(level_rays, scan, table.ball_radius)
+        radius = self.table.ball_radius[self._game.level_of[envs]]
+        return observations.ray_observation(level_rays, scan, radius)
 
-    def _episode_lengths(self) -> Int64:
+    def _episode_lengths(self, level_of: Int64) -> Int64:
         """Return the control steps, (N,), after which an episode is truncated."""
-        steps = np.ceil(self.table.time_limit_s / self.duration_s - 1e-9).astype(np.int64)
+        limit_s = self.table.time_limit_s[level_of]
+        steps = np.ceil(limit_s / self.duration_s - 1e-9).astype(np.int64)
         limit = self.config.max_episode_steps
         return steps if limit is None else np.minimum(steps, limit)
 
@@ -559,7 +510,7 @@ class Simulation:
             level=self.compiled.level,
             physics=self._stepper.state[rows].copy(),
             game=self.state.copy_rows(rows),
-            level_of_row=self._level_of_row[rows].copy(),
+            level_of_row=self._game.level_of[rows].copy(),
             generators=tuple(self._generators[row].bit_generator.state for row in rows),
             preset=self.compiled.preset,
             control_dt_s=self.config.control_dt_s,
@@ -581,13 +532,12 @@ class Simulation:
         self._stepper.reset(np.sort(rows))
         self._stepper.state[rows] = snapshot.physics
         self.state.set_rows(rows, snapshot.game)
-        self._level_of_row[rows] = snapshot.level_of_row
+        self._game.level_of[rows] = snapshot.level_of_row
         for row, generator in zip(rows, snapshot.generators, strict=True):
             self._generators[row].bit_generator.state = generator
         # The way is only kept where it is rewarded; elsewhere it is found again, from the first
         # step on, after which the ball has passed what it has reached.
-        self._follow_route(rows[snapshot.game["steps"] > 0])
-        self._measure_potential(rows)
+        self._measure_potential(rows, snapshot.game.steps > 0)
 
     def check_snapshot(self, snapshot: Snapshot) -> None:
         """Refuse what is no snapshot of the game that is played here.
@@ -621,21 +571,6 @@ class Simulation:
                 f"snapshot: found physics of shape {snapshot.physics.shape}, of another version of "
                 f"MuJoCo or of the package; must be (n, {width})"
             )
-
-    def _table_of(self, rows: Int64) -> LevelTable:
-        """Return the level data of ``rows``.
-
-        Games that play one level differ in nothing there, and views of it for as many rows are
-        kept: making one costs as much as all else in a reset.
-        """
-        if len(self._levels.start) > 1:
-            return self._levels.for_rows(self._level_of_row[rows])
-        count = len(rows)
-        if count not in self._views:
-            if len(self._views) == _VIEWS_KEPT:
-                self._views.clear()
-            self._views[count] = self._levels.for_rows(self._level_of_row[rows])
-        return self._views[count]
 
     def _checked(self, rows: Int64) -> Int64:
         """Return ``rows`` as indices if they are different row numbers; a mask is not."""

@@ -63,7 +63,7 @@ def render_overview(level: Level, width: int, height: int, view: View | None = N
     stage.model.vis.quality.shadowsize = SHADOW_PIXELS
     canvas = Canvas(stage.model, width, height)
     try:
-        state = GameState.initial(LevelTable.of([level]))
+        state = GameState.initial(LevelTable.of_levels([level]), 1)
         stage.show(stage.model.qpos0, state, 0, 0.4)
         stage.light_from(middle)
         return canvas.draw(stage.data, look(position, target))

@@ -77,7 +77,7 @@ class GameRenderer:
         stage, canvas = self._open()
         simulation = self._simulation
         state = simulation.state
-        game_mode = int(state.camera_mode[row])
+        game_mode = int(state.camera.mode[row])
         mode = game_mode if camera == "game" else int(camera)
         if mode == MODE_RETREAT != game_mode:
             # Nothing retreats: this is where the camera is when it has.
@@ -87,7 +87,7 @@ class GameRenderer:
         stage.clear_view(mode)
         stage.light_from(ball[0])
         modes = np.array([mode])
-        position = camera_position(modes, ball, state.camera_x[row : row + 1])
+        position = camera_position(modes, ball, state.camera.x[row : row + 1])
         target = camera_target(modes, ball)
         return canvas.draw(stage.data, look(position[0], target[0]))
 

@@ -25,11 +25,15 @@ from roller_env.compile.scenery import (
     ring_count,
 )
 from roller_env.compile.textures import parse_colour
-from roller_env.game.cameras import MODE_BELOW, MODE_FIRST_PERSON, TriggerKind
+from roller_env.game.cameras import MODE_BELOW, MODE_FIRST_PERSON
 from roller_env.game.state import GameState
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
 from roller_env.physics.presets import PhysicsPreset
+from roller_env.pieces.camera_trigger import CAMERA_TRIGGER, TriggerKind
+from roller_env.pieces.coin import COIN
+from roller_env.pieces.lift_pad import LIFT_PAD
+from roller_env.pieces.plate import PLATE
 from roller_env.units import quants
 
 Bool = npt.NDArray[np.bool_]
@@ -127,11 +131,11 @@ class Stage:
         self.model.geom_rgba[:] = self._rgba
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_camlight(self.model, self.data)
-        self._show_coins(state.coin_taken[row, : len(self._coins)], time_s)
+        self._show_coins(state.of(COIN).taken[row, : len(self._coins)], time_s)
         self._show_machines(state, row)
         self._show_rings(time_s)
         self._show_sparks(time_s)
-        self._show_panes(state.trigger_spent[row], time_s)
+        self._show_panes(state.of(CAMERA_TRIGGER).spent[row], time_s)
 
     def light_from(self, centre: Float64) -> None:
         """Let the sun cast shadows round ``centre``, (3,) metres."""
@@ -172,17 +176,18 @@ class Stage:
     def _show_machines(self, state: GameState, row: int) -> None:
         """Colour plates, gates and pads by what they are doing."""
         matid = self.model.geom_matid
-        struck, down = state.plate_struck[row], state.plate_down[row]
+        plate_state = state.of(PLATE)
+        struck, down = plate_state.struck[row], plate_state.down[row]
         plates = len(self._plates)
         phase = np.where(down, 2, np.where(struck, 1, 0))[:plates]
         matid[self._plates] = self._materials["plate"][phase]
         gates = zip(self._level.gates, self._gates, self._bars, strict=True)
         for number, (gate, slab, bars) in enumerate(gates):
-            opening = bool(state.gate_opening[row, number])
+            opening = bool(state.signals[row, number])
             height = self.data.geom_xpos[slab, 2]
             phase_of_gate = 2 if opening and height <= gate.lowers_to else int(opening)
             matid[bars] = self._materials["gate"][phase_of_gate]
-        pushing = state.thrust_s[row, : len(self._pads)] > 0.0
+        pushing = state.of(LIFT_PAD).thrust_s[row, : len(self._pads)] > 0.0
         matid[self._pads] = self._materials["pad"][pushing.astype(np.int64)]
         self._hide(self._glows, ~pushing)
 

@@ -136,7 +136,7 @@ def _frames(
 def panel_lines(simulation: Simulation, row: int = 0) -> list[str]:
     """Return what the panel says of a game: points, coins and time, and how it ended."""
     results = {name: values[0] for name, values in simulation.results(np.array([row])).items()}
-    coins, coins_in_level = results["coins"], simulation.table.coin_count[row]
+    coins, coins_in_level = results["coins"], simulation.coins_in_level[row]
     lines = [
         f"{COIN_ON_PANELS * coins} points   {results['time_s']:.1f} s",
         f"{coins} of {coins_in_level} coins",

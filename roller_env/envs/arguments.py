@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.checks import is_whole, known_names
+from roller_env.pieces.coin import COIN
 from roller_env.simulation import Placement, Simulation, Snapshot
 
 Bool = npt.NDArray[np.bool_]
@@ -125,7 +126,7 @@ def reset_of(options: Mapping[str, Any] | None, simulation: Simulation, *, batch
         position=read.vectors(given, "position"),
         velocity=read.vectors(given, "velocity"),
         angular_velocity=read.vectors(given, "angular_velocity"),
-        coin_left=read.coins(given, simulation.table.coin_at.shape[1]),
+        coin_left=read.coins(given, simulation.table.of(COIN).at.shape[1]),
     )
     return Reset(rows, bool(intro), None, placement)
 
@@ -149,8 +150,7 @@ def _state(state: object, simulation: Simulation, count: int) -> Snapshot:
         state = state.take(np.zeros(count, dtype=np.int64))
     if len(state) != count:
         raise ValueError(f"options['state']: found {len(state)} rows for the {count} to be reset")
-    ends = ("finished", "fallen", "diverged", "truncated")
-    over = np.flatnonzero(np.any([state.game[name] for name in ends], axis=0))
+    over = np.flatnonzero(state.game.over)
     if len(over):
         raise ValueError(
             f"options['state']: found rows {over.tolist()} over; an episode can begin only where "

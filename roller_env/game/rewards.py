@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from roller_env import checks
-from roller_env.compiled import compiled
-from roller_env.game.state import GameState
-from roller_env.game.sweep import Events
-from roller_env.game.tables import LevelTable
+from roller_env.arrays import Float64, Int64
+from roller_env.compiled import part
 
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
-Int64 = npt.NDArray[np.int64]
 RewardMode = Literal["points", "shaped"]
 
 
@@ -44,116 +38,98 @@ class RewardWeights:
             value = checks.number(f"reward_weights.{name}", getattr(self, name))
             object.__setattr__(self, name, value)
 
-
-def points_reward(events: Events, weights: RewardWeights) -> Float64:
-    """Return the points, (N,), of a step's events: coins, finish, fall."""
-    points = np.empty(len(events.points))
-    _add_up(
-        weights.coin,
-        weights.finish,
-        weights.fall,
-        events.points,
-        events.finished,
-        events.fallen,
-        points,
-    )
-    return points
+    @property
+    def terms(self) -> tuple[float, float, float, float]:
+        """The weights in the order of `TERMS`."""
+        return (self.coin, self.finish, self.fall, self.progress)
 
 
-@compiled
-def _add_up(
-    coin: float,
-    finish: float,
-    fall: float,
-    coins: Int64,
-    finished: Bool,
-    fallen: Bool,
-    points: Float64,
-) -> None:
-    for row in range(len(points)):
-        points[row] = coin * coins[row] + finish * finished[row] + fall * fallen[row]
+TERMS: Final = ("coin", "finish", "fall", "progress")
+"""What a reward is the sum of: each of the weights times what happened, and the shaping."""
 
 
-def follow_route(state: GameState, table: LevelTable, ball: Float64) -> None:
-    """Advance each row's next waypoint past the furthest leg that the ball, (N, 3), has reached.
+class ShapingState(NamedTuple):
+    """What the shaping of N envs owns.
+
+    Attributes:
+        waypoint: (N,) index of the next waypoint of the route.
+        potential: (N,) of where the ball is.
+    """
+
+    waypoint: Int64
+    potential: Float64
+
+    @staticmethod
+    def initial(num_envs: int) -> ShapingState:
+        """Return the state at the start of an episode."""
+        return ShapingState(np.zeros(num_envs, dtype=np.int64), np.zeros(num_envs))
+
+
+@part
+def next_waypoint(ball: Float64, route: Float64, length: int, radius: float, waypoint: int) -> int:
+    """Return the furthest leg that the ball, (3,), has reached, or ``waypoint``.
 
     A leg is reached when the ball is within the route's radius of it. Legs that the ball has
     jumped over count as passed: a waypoint missed in flight must not draw it back.
+
+    Args:
+        ball: its centre, metres.
+        route: (W, 3) waypoints, metres.
+        length: how many there are.
+        radius: the route's, metres.
+        waypoint: index of the next so far.
     """
-    _follow_route(ball, table.route, table.route_length, table.route_radius, state.waypoint)
+    # The furthest leg counts, and the legs up to the next waypoint are behind already.
+    for leg in range(length - 1, waypoint, -1):
+        if _leg_distance2(ball, route[leg - 1], route[leg]) <= radius * radius:
+            return leg
+    return waypoint
 
 
-@compiled
-def _follow_route(
-    ball: Float64, route: Float64, length: Int64, radius: Float64, waypoint: Int64
-) -> None:
-    for row in range(len(ball)):
-        x, y, z = ball[row, 0], ball[row, 1], ball[row, 2]
-        # The furthest leg counts, and the legs up to the next waypoint are behind already.
-        for leg in range(length[row] - 1, waypoint[row], -1):
-            start, end = route[row, leg - 1], route[row, leg]
-            if _leg_distance2(x, y, z, start, end) <= radius[row] * radius[row]:
-                waypoint[row] = leg
-                break
-
-
-@compiled
-def _leg_distance2(x: float, y: float, z: float, start: Float64, end: Float64) -> float:
+@part
+def _leg_distance2(ball: Float64, start: Float64, end: Float64) -> float:
     """Return the squared distance of a point to the piece from ``start`` to ``end``."""
     way_x, way_y, way_z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
-    x, y, z = x - start[0], y - start[1], z - start[2]
+    x, y, z = ball[0] - start[0], ball[1] - start[1], ball[2] - start[2]
     length2 = way_x * way_x + way_y * way_y + way_z * way_z
     share = (x * way_x + y * way_y + z * way_z) / max(length2, 1e-12)
     share = min(max(share, 0.0), 1.0)
     x, y, z = x - share * way_x, y - share * way_y, z - share * way_z
-    return x * x + y * y + z * z
+    squared: float = x * x + y * y + z * z
+    return squared
 
 
-def route_progress(state: GameState, table: LevelTable, ball: Float64) -> Float64:
-    """Return the potential, (N,): the share of the route that lies behind the ball, 0 to 1.
+@part
+def route_progress(
+    ball: Float64, route: Float64, arc: Float64, length: int, waypoint: int
+) -> float:
+    """Return the fraction of the route that lies behind the ball, 0 to 1.
 
     It is the arc length up to the next waypoint less the straight distance to it.
+
+    Args:
+        ball: its centre, (3,) metres.
+        route: (W, 3) waypoints, metres.
+        arc: (W,) metres along the route up to each.
+        length: how many there are.
+        waypoint: index of the next.
     """
-    progress = np.zeros(len(ball))
-    _route_progress(
-        ball, table.route, table.route_arc, table.route_length, state.waypoint, progress
-    )
-    return progress
+    total = arc[length - 1] if length > 1 else 0.0
+    if total <= 0.0:
+        return 0.0
+    goal = route[waypoint]
+    x, y, z = goal[0] - ball[0], goal[1] - ball[1], goal[2] - ball[2]
+    behind = arc[waypoint] - math.sqrt(x * x + y * y + z * z)
+    fraction: float = min(max(behind / total, 0.0), 1.0)
+    return fraction
 
 
-@compiled
-def _route_progress(
-    ball: Float64,
-    route: Float64,
-    arc: Float64,
-    length: Int64,
-    waypoint: Int64,
-    progress: Float64,
-) -> None:
-    for row in range(len(ball)):
-        total = arc[row, length[row] - 1] if length[row] > 1 else 0.0
-        if total > 0.0:
-            goal = route[row, waypoint[row]]
-            x, y, z = goal[0] - ball[row, 0], goal[1] - ball[row, 1], goal[2] - ball[row, 2]
-            behind = arc[row, waypoint[row]] - math.sqrt(x * x + y * y + z * z)
-            progress[row] = min(max(behind / total, 0.0), 1.0)
-
-
-def shaping(before: Float64, after: Float64, terminated: Bool, discount: float) -> Float64:
-    """Return gamma * Phi(s') - Phi(s), (N,), with Phi = 0 in terminal states.
+@part
+def shaping(before: float, after: float, terminated: bool, discount: float) -> float:
+    """Return gamma * Phi(s') - Phi(s), with Phi = 0 in terminal states.
 
     Over any episode this telescopes to a sum that depends on the start alone, so it never changes
     which policy is best (Ng, Harada & Russell 1999), and staying in place earns
     (gamma - 1) * Phi <= 0.
     """
-    reward = np.empty(len(before))
-    _shape(before, after, terminated, float(discount), reward)
-    return reward
-
-
-@compiled
-def _shape(
-    before: Float64, after: Float64, terminated: Bool, discount: float, reward: Float64
-) -> None:
-    for row in range(len(reward)):
-        reward[row] = discount * (0.0 if terminated[row] else after[row]) - before[row]
+    return discount * (0.0 if terminated else after) - before

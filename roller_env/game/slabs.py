@@ -8,16 +8,14 @@ control step begins, so that it does not depend on how an engine's contacts yiel
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-from roller_env.compiled import compiled
-
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
+from roller_env.arrays import Float64
+from roller_env.compiled import part
+from roller_env.game.bodies import Bodies
+from roller_env.game.tables import LevelTable
 
 BRAKING_M_S2: Final = 5.0
 """How hard a slab brakes for a ball under it: a twentieth of what its servo can do, so that it
@@ -28,89 +26,45 @@ GAP_M: Final = 0.001
 """Where a slab stops over the ball: it counts as touching, and does not brake a ball that rolls."""
 
 
-@dataclass(slots=True, eq=False)
-class Bodies:
-    """Where the ball and the slabs are when a control step begins.
-
-    Displacements are from the slabs' ``at``, metres, <= 0.
-
-    Attributes:
-        ball: (N, 3) ball centres, metres, world frame.
-        velocity: (N, 3) their velocities, m/s.
-        plate: (N, P) displacements of the plates.
-        gate: (N, G) displacements of the gates.
-        plate_aim: (N, P) displacements to which the plates are being pulled; they trail them.
-        gate_aim: (N, G) likewise of the gates.
-    """
-
-    ball: Float64
-    velocity: Float64
-    plate: Float64
-    gate: Float64
-    plate_aim: Float64
-    gate_aim: Float64
-
-
-@compiled
-def lower(
+@part
+def lowering(
     duration_s: float,
-    moves: Bool,
-    speed: Float64,
-    centre: Float64,
-    half: Float64,
-    heading: Float64,
-    slab: Float64,
-    aim: Float64,
-    ball: Float64,
-    velocity: Float64,
-    radius: Float64,
-    out: Float64,
-) -> None:
-    """Write the velocities at which slabs are pulled in the next step, (n, slabs) m/s.
+    level: int,
+    env: int,
+    mover: int,
+    table: LevelTable,
+    bodies: Bodies,
+) -> float:
+    """Return the velocity at which a slab that goes down is pulled in the next step, m/s.
 
-    Args:
-        duration_s: length of the step.
-        moves: (n, slabs) whether each has been set going.
-        speed: (n, slabs) m/s, downwards.
-        centre: (n, slabs, 3) where they stood at the start, metres.
-        half: (n, slabs, 3) half edges, metres.
-        heading: (n, slabs, 2) cosine and sine of their yaw.
-        slab: (n, slabs) displacements.
-        aim: (n, slabs) displacements to which they are being pulled.
-        ball: (n, 3) ball centres, metres.
-        velocity: (n, 3) m/s.
-        radius: (n,) the balls' radii.
-        out: (n, slabs) the velocities; below zero is down. Above zero an aim is taken back that
-            lies within the ball, which is then touched and not pressed.
+    Below zero is down. Above zero an aim is taken back that lies within the ball, which is then
+    touched and not pressed.
     """
-    for row in range(moves.shape[0]):
-        for number in range(moves.shape[1]):
-            if not moves[row, number]:
-                out[row, number] = 0.0
-                continue
-            down = speed[row, number]
-            bottom = centre[row, number, 2] + slab[row, number] - half[row, number, 2]
-            now, soon = _room_under(
-                duration_s,
-                centre[row, number],
-                half[row, number],
-                heading[row, number],
-                bottom,
-                ball[row],
-                velocity[row],
-                radius[row],
-            )
-            if soon < np.inf:
-                room = now if now < 0.0 else max(soon - GAP_M, 0.0)
-                down = min(down, math.sqrt(2.0 * BRAKING_M_S2 * max(room, 0.0)))
-                left = room - (slab[row, number] - aim[row, number])
-                # Half of what is left in a step, so that the last ones are slow; an aim within the
-                # ball is taken back at once.
-                down = min(down, left / (2.0 * duration_s) if left > 0.0 else left / duration_s)
-            out[row, number] = -down
+    half, centre = table.mover_half[level, mover], table.mover_centre[level, mover]
+    slab = bodies.displacement[env, mover]
+    down: float = table.mover_speed[level, mover]
+    now, soon = _room_under(
+        duration_s,
+        centre,
+        half,
+        table.mover_heading[level, mover],
+        centre[2] + slab - half[2],
+        bodies.position[env],
+        bodies.velocity[env],
+        table.ball_radius[level],
+    )
+    if soon < np.inf:
+        room = now if now < 0.0 else max(soon - GAP_M, 0.0)
+        down = min(down, math.sqrt(2.0 * BRAKING_M_S2 * max(room, 0.0)))
+        left = room - (slab - bodies.aim[env, mover])
+        # Half of what is left in a step, so that the last ones are slow; an aim within the ball is
+        # taken back at once.
+        down = min(down, left / (2.0 * duration_s) if left > 0.0 else left / duration_s)
+    velocity: float = -down
+    return velocity
 
 
-@compiled
+@part
 def _room_under(
     duration_s: float,
     centre: Float64,
@@ -139,14 +93,14 @@ def _room_under(
     return now, soon
 
 
-@compiled
+@part
 def _beyond(start: float, way: float, half: float) -> float:
     """Return how far beyond +- ``half`` all of an interval of ``way`` from ``start`` lies."""
     low, high = min(start, start + way), max(start, start + way)
     return max(low - half, -half - high, 0.0)
 
 
-@compiled
+@part
 def _height(across_x: float, across_y: float, radius: float) -> float:
     """Return a ball's height over its centre at a distance from it, ``-inf`` beyond the radius."""
     left2 = radius * radius - across_x * across_x - across_y * across_y

@@ -1,99 +1,90 @@
-"""GameState: all that the rules change, arrays with a leading axis of environments."""
+"""GameState: all that the rules change, arrays with a leading axis of envs."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any, Final
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.game.cameras import OVERHEAD_WAITS
-from roller_env.game.tables import Kind, LevelTable
-
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
-Int64 = npt.NDArray[np.int64]
+from roller_env.arrays import Bool, Float64, Int64
+from roller_env.game.cameras import CameraState
+from roller_env.game.kinds import RULES
+from roller_env.game.rewards import TERMS, ShapingState
+from roller_env.game.tables import LevelTable
+from roller_env.pieces.coin import COIN
+from roller_env.pieces.rules import Rules, StateT
 
 COIN_ON_PANELS: Final = 10
 """What a coin counts on whatever shows a player how the game stands: the original's `digits` show
 ten times the variable. Rewards, scores and all that programs read count a coin as one."""
 
 
-@dataclass(eq=False)
-class GameState:
-    """The game's own state of N environments; the ball and the slabs are MuJoCo's.
+class GameState(NamedTuple):
+    """The game's own state of N envs; the ball and the slabs are the physics'.
 
     Attributes:
         steps: (N,) control steps since the episode began.
         control_delay_s: (N,) time until the keys work (the intro).
-        coin_taken: (N, K) which coins are collected.
-        points: (N,) how many.
-        touching: (N, M) which regions the ball was in at the end of the last step.
-        plate_struck: (N, P) which plates are sinking or down.
-        plate_down: (N, P) which plates have arrived.
-        gate_opening: (N, G) which gates are lowering or down.
-        thrust_s: (N, A) how much longer each lift pad pushes the ball up.
-        trigger_spent: (N, T) which one-time camera triggers are dead.
-        camera_mode: (N,) 0 to 5.
-        camera_delay_s: (N, W) times until mode 2 is set, one for each entry of an overhead trigger
-            that waits, in order; ``inf`` where none does.
-        camera_x: (N,) world x of the camera while it retreats (mode 1), metres.
-        waypoint: (N,) index of the next waypoint of the route.
+        touching: (N, R) which regions the ball was in at the end of the last step.
+        signals: (N, G) which gates have been told to open.
         finished: (N,) the ball has reached the finish and is frozen.
         fallen: (N,) the ball has fallen below the kill height.
         diverged: (N,) the physics failed.
         truncated: (N,) the time is up.
+        earned: (N, terms) what the episode has earned so far, by `roller_env.game.rewards.TERMS`.
+        camera: what the cameras own.
+        shaping: what the shaping of the reward owns.
+        kinds: what each kind of piece owns; see `of`.
     """
 
     steps: Int64
     control_delay_s: Float64
-    coin_taken: Bool
-    points: Int64
     touching: Bool
-    plate_struck: Bool
-    plate_down: Bool
-    gate_opening: Bool
-    thrust_s: Float64
-    trigger_spent: Bool
-    camera_mode: Int64
-    camera_delay_s: Float64
-    camera_x: Float64
-    waypoint: Int64
+    signals: Bool
     finished: Bool
     fallen: Bool
     diverged: Bool
     truncated: Bool
+    earned: Float64
+    camera: CameraState
+    shaping: ShapingState
+    kinds: tuple[Any, ...]
 
     @staticmethod
-    def initial(table: LevelTable) -> GameState:
-        """Return the state of the table's rows at the start of an episode."""
-        n = len(table.start)
+    def initial(table: LevelTable, num_envs: int) -> GameState:
+        """Return the state of N envs at the start of an episode, of whichever of the levels."""
 
         def flags(*shape: int) -> Bool:
-            return np.zeros((n, *shape), dtype=bool)
+            return np.zeros((num_envs, *shape), dtype=bool)
 
-        waits = OVERHEAD_WAITS if table.width(Kind.TRIGGER) else 0
         return GameState(
-            steps=np.zeros(n, dtype=np.int64),
-            control_delay_s=np.zeros(n),
-            coin_taken=flags(table.coin_at.shape[1]),
-            points=np.zeros(n, dtype=np.int64),
+            steps=np.zeros(num_envs, dtype=np.int64),
+            control_delay_s=np.zeros(num_envs),
             touching=flags(table.region_radius.shape[1]),
-            plate_struck=flags(table.width(Kind.PLATE)),
-            plate_down=flags(table.width(Kind.PLATE)),
-            gate_opening=flags(table.gate_stop.shape[1]),
-            thrust_s=np.zeros((n, table.width(Kind.LIFT_PAD))),
-            trigger_spent=flags(table.width(Kind.TRIGGER)),
-            camera_mode=np.zeros(n, dtype=np.int64),
-            camera_delay_s=np.full((n, waits), np.inf),
-            camera_x=np.zeros(n),
-            waypoint=np.zeros(n, dtype=np.int64),
+            signals=flags(int(table.gate_count.max())),
             finished=flags(),
             fallen=flags(),
             diverged=flags(),
             truncated=flags(),
+            earned=np.zeros((num_envs, len(TERMS))),
+            camera=CameraState.initial(num_envs),
+            shaping=ShapingState.initial(num_envs),
+            kinds=tuple(
+                rules.state(own, num_envs) for rules, own in zip(RULES, table.kinds, strict=True)
+            ),
         )
+
+    def of(self, rules: Rules[Any, StateT]) -> StateT:
+        """Return a kind's own state."""
+        state: StateT = self.kinds[RULES.index(rules)]
+        return state
+
+    @property
+    def coins(self) -> Int64:
+        """(N,) how many coins are collected."""
+        return self.of(COIN).collected
 
     @property
     def terminated(self) -> Bool:
@@ -105,20 +96,74 @@ class GameState:
         """(N,) whether the episode has ended, also by time."""
         return self.terminated | self.truncated
 
-    def copy_rows(self, rows: Int64 | slice = slice(None)) -> dict[str, npt.NDArray[Any]]:
-        """Return copies of the rows' arrays by name."""
-        return {f.name: np.array(getattr(self, f.name)[rows]) for f in fields(self)}
+    def copy_rows(self, rows: Int64 | slice = slice(None)) -> GameState:
+        """Return the state of some of the envs, as a copy."""
+        return cast("GameState", _mapped(self, lambda array: np.array(array[rows])))
 
-    def set_rows(self, rows: Int64 | slice, values: dict[str, npt.NDArray[Any]]) -> None:
+    def set_rows(self, rows: Int64 | slice, other: GameState) -> None:
         """Write what `copy_rows` returned back into ``rows``."""
-        for field in fields(self):
-            getattr(self, field.name)[rows] = values[field.name]
+        for mine, theirs in zip(self.arrays(), other.arrays(), strict=True):
+            mine[rows] = theirs
+
+    def arrays(self) -> Iterator[npt.NDArray[Any]]:
+        """Yield every array, always in the same order."""
+        yield from _leaves(self)
+
+    def named(self) -> dict[str, npt.NDArray[Any]]:
+        """Return every array by its name, such as ``plate/struck``."""
+        owners = {"kinds": [rules.name for rules in RULES]}
+        return {
+            name: array
+            for field in self._fields
+            for name, array in _named(getattr(self, field), field, owners.get(field))
+        }
+
+    def with_arrays(self, named: Mapping[str, npt.NDArray[Any]]) -> GameState:
+        """Return a state of the same kind with the arrays of another's `named`."""
+        arrays = iter([named[name] for name in self.named()])
+        return cast("GameState", _mapped(self, lambda array: next(arrays)))
+
+    @staticmethod
+    def joined(states: Sequence[GameState]) -> GameState:
+        """Return the states of some envs and of others as one."""
+        parts = zip(*(state.arrays() for state in states), strict=True)
+        whole = (np.concatenate(arrays) for arrays in parts)
+        return cast("GameState", _mapped(states[0], lambda array: next(whole)))
 
 
-def score_percent(points: Int64, coin_count: Int64, finished: Bool) -> Float64:
+def _mapped(tree: Any, function: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> Any:
+    """Return a tree of tuples with every array replaced."""
+    if not isinstance(tree, tuple):
+        return tree if tree is None else function(tree)
+    branches = (_mapped(branch, function) for branch in tree)
+    return type(tree)(*branches) if hasattr(tree, "_fields") else tuple(branches)
+
+
+def _named(
+    tree: Any, name: str, branches: Sequence[str] | None = None
+) -> Iterator[tuple[str, npt.NDArray[Any]]]:
+    """Yield the arrays of a tree with the names on the way; ``branches`` stand for this one's."""
+    if not isinstance(tree, tuple):
+        if tree is not None:
+            yield name, tree
+        return
+    prefix = "" if branches else f"{name}/"
+    for branch, inner in zip(branches or tree._fields, tree, strict=True):  # type: ignore[attr-defined]
+        yield from _named(inner, prefix + branch)
+
+
+def _leaves(tree: Any) -> Iterator[npt.NDArray[Any]]:
+    if isinstance(tree, tuple):
+        for branch in tree:
+            yield from _leaves(branch)
+    elif tree is not None:
+        yield tree
+
+
+def score_percent(coins: Int64, coin_count: Int64, finished: Bool) -> Float64:
     """Return the percentage of the level's coins collected, (N,).
 
     A level without coins is all or nothing: 100 once it is finished, 0 before and after a fall.
     """
-    collected = 100.0 * points / np.maximum(coin_count, 1)
+    collected = 100.0 * coins / np.maximum(coin_count, 1)
     return np.where(coin_count > 0, collected, np.where(finished, 100.0, 0.0))

@@ -8,47 +8,17 @@ from __future__ import annotations
 
 import weakref
 from collections import defaultdict
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from roller_env.pieces.piece import Float64, Mover, Piece, Region, Solid
+from roller_env.pieces.piece import ExpandedLevel, Float64, Mover, Piece, Region, Solid
 
 if TYPE_CHECKING:
     from roller_env.level.schema import Level
 
 TOUCH_TOLERANCE_M: Final = 1e-4
 """Soft contacts hold surfaces this near to each other; nearer counts as touching."""
-
-
-@dataclass(frozen=True, eq=False)
-class ExpandedLevel:
-    """What a level consists of, SI units, world frame, in the order of its pieces.
-
-    Attributes:
-        solids: what stands still.
-        movers: what is solid and moves, where it is at the start.
-        coins: (K, 3) float64 centres, metres.
-        coin_sources: the piece that each coin comes from, as a path such as ``coins[0]``.
-        regions: where pieces act on the ball, by kind of piece.
-    """
-
-    solids: tuple[Solid, ...]
-    movers: tuple[Mover, ...]
-    coins: Float64
-    coin_sources: tuple[str, ...]
-    regions: dict[type[Piece], tuple[Region, ...]]
-
-    @property
-    def ground(self) -> tuple[Solid, ...]:
-        """What stands still and does nothing."""
-        return tuple(solid for solid in self.solids if solid.material)
-
-    @property
-    def at_the_start(self) -> tuple[Solid, ...]:
-        """All that is solid, where it stands at the start."""
-        return (*self.solids, *(mover.solid for mover in self.movers))
 
 
 _EXPANDED: Final[dict[int, ExpandedLevel]] = {}
@@ -71,8 +41,10 @@ def _expand(level: Level) -> ExpandedLevel:
     coins: list[Float64] = [np.zeros((0, 3))]
     coin_sources: list[str] = []
     regions: dict[type[Piece], list[Region]] = defaultdict(list)
+    pieces: dict[type[Piece], list[Piece]] = defaultdict(list)
     for source, piece in level.pieces():
         solids += piece.solids(source)
+        pieces[type(piece)].append(piece)
         mover, region, own = piece.mover(source), piece.region(touch), piece.coins()
         if mover is not None:
             movers.append(mover)
@@ -86,4 +58,5 @@ def _expand(level: Level) -> ExpandedLevel:
         coins=np.concatenate(coins).astype(np.float64),
         coin_sources=tuple(coin_sources),
         regions={kind: tuple(found) for kind, found in regions.items()},
+        pieces={kind: tuple(found) for kind, found in pieces.items()},
     )

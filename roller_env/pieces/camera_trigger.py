@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import Final, Literal, NamedTuple
 
+import numpy as np
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from roller_env.arrays import Bool, Float64, Int64
+from roller_env.compiled import part
 from roller_env.pieces.fields import Point, PositiveLength, Size
-from roller_env.pieces.piece import Piece, Region, half_of
+from roller_env.pieces.piece import ExpandedLevel, Piece, Region, half_of
+from roller_env.pieces.rules import After, Noticed, Own, Rules, padded
 from roller_env.units import quants
 
 
@@ -43,3 +49,127 @@ class CameraTrigger(Piece):
         if self.size is None:
             return Region(self.at, (0.0, 0.0, 0.0), self.reach)
         return Region(self.at, half_of(self.size), touch)
+
+
+# Rules --------------------------------------------------------------------------------------------
+
+
+class TriggerKind(IntEnum):
+    """What a camera trigger does; see `CameraTrigger`."""
+
+    OVERHEAD = 0
+    RETREAT = 1
+    FIRST_PERSON = 2
+
+
+_OVERHEAD: Final = int(TriggerKind.OVERHEAD)
+_FIRST_PERSON: Final = int(TriggerKind.FIRST_PERSON)
+
+OVERHEAD_DELAY_S: Final = 100.0 / 60.0
+"""`flipcam` waits 100 frames, at the nominal 60 frames a second."""
+
+OVERHEAD_WAITS: Final = 8
+"""Entries of one game that can wait at once. `flipcam` runs once for every impact: each entry sets
+mode 2 at the end of a wait of its own, and other events may set other modes in between. A ball that
+enters more often in `OVERHEAD_DELAY_S` turns round every fifth of a second; the newest entry then
+takes the place of the one before."""
+
+
+class CameraTriggerTable(NamedTuple):
+    """Numbers of T triggers.
+
+    Attributes:
+        kind: (L, T) `TriggerKind`.
+    """
+
+    kind: Int64
+
+
+class CameraTriggerState(NamedTuple):
+    """What varies of T triggers.
+
+    Attributes:
+        spent: (N, T) one-time triggers that are dead.
+        delay_s: (N, W) times until mode 2 is set, one for each entry of an overhead trigger that
+            waits, in order; ``inf`` where none does.
+    """
+
+    spent: Bool
+    delay_s: Float64
+
+
+def _table(levels: Sequence[ExpandedLevel]) -> CameraTriggerTable:
+    kinds = [[TriggerKind[t.kind.upper()] for t in level.of(CameraTrigger)] for level in levels]
+    return CameraTriggerTable(padded(kinds).astype(np.int64))
+
+
+def _state(table: CameraTriggerTable, num_envs: int) -> CameraTriggerState:
+    triggers = table.kind.shape[1]
+    waits = OVERHEAD_WAITS if triggers else 0
+    return CameraTriggerState(
+        spent=np.zeros((num_envs, triggers), dtype=bool),
+        delay_s=np.full((num_envs, waits), np.inf),
+    )
+
+
+@part
+def _notice(now: Noticed, table: CameraTriggerTable, state: CameraTriggerState, own: Own) -> None:
+    for trigger in range(own.regions):
+        now.live[own.region + trigger] &= not state.spent[now.env, trigger]
+
+
+@part
+def _react(now: After, table: CameraTriggerTable, state: CameraTriggerState, own: Own) -> None:
+    """Let the entries' waits run and the triggers act.
+
+    Where several set the mode in one step, the latest counts. A first-person trigger acts all the
+    time that the ball is in it.
+    """
+    delay_s = state.delay_s[now.env]
+    now.camera.overhead[now.env] = _is_due(now.duration_s, delay_s)
+    latest = -np.inf
+    for trigger in range(own.regions):
+        entry, kind = now.entry[own.region + trigger], table.kind[now.level, trigger]
+        acts = entry < np.inf
+        time = entry if acts else 0.0
+        if kind == _FIRST_PERSON:
+            acts = acts or now.inside[own.region + trigger]
+        elif acts and kind == _OVERHEAD:
+            _wait(delay_s)
+            acts = False
+        elif acts:
+            state.spent[now.env, trigger] = True
+        if acts and time >= latest:
+            now.camera.trigger[now.env] = kind
+            latest = time
+
+
+@part
+def _is_due(duration_s: float, delay_s: Float64) -> bool:
+    """Let the times run that entries of `TriggerKind.OVERHEAD` wait; say whether one has ended."""
+    waiting, is_due = 0, False
+    for place in range(len(delay_s)):
+        left = delay_s[place] - duration_s
+        delay_s[place] = np.inf
+        # Sums of control steps miss the end by rounding.
+        if left > 1e-9:
+            delay_s[waiting] = left
+            waiting += 1
+        else:
+            is_due = True
+    return is_due
+
+
+@part
+def _wait(delay_s: Float64) -> None:
+    """Let one more entry wait, behind the others; two of one step are one."""
+    place = 0
+    while place < len(delay_s) - 1 and delay_s[place] < OVERHEAD_DELAY_S:
+        place += 1
+    delay_s[place] = OVERHEAD_DELAY_S
+
+
+CAMERA_TRIGGER: Final = Rules(
+    name="camera_trigger", table=_table, state=_state, notice=_notice, react=_react
+)
+CameraTrigger.rules = CAMERA_TRIGGER

@@ -2,14 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final
+from collections.abc import Sequence
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from roller_env.arrays import Bool, Float64, Int64
+from roller_env.compiled import part
 from roller_env.pieces.fields import Degrees, Part, PlanePoint, Point, PositiveLength
-from roller_env.pieces.piece import Float64, Piece
+from roller_env.pieces.piece import ExpandedLevel, Piece
+from roller_env.pieces.rules import (
+    FAR_M,
+    After,
+    Entry,
+    Own,
+    Rules,
+    Seen,
+    distance2,
+    fraction_entry,
+    padded,
+    show_place,
+)
+from roller_env.pieces.sweep import ANYWHERE, POINT, bounds, meets, vector, visit
 from roller_env.units import quants
 
 COIN_REACH_M: Final = quants(30.0)
@@ -99,3 +115,150 @@ class Coins(Piece):
         offsets = np.stack([xs, ys, np.zeros_like(xs)], -1).reshape(-1, 3)
         rows: Float64 = np.array(grid.centre) + offsets
         return rows
+
+
+# Rules --------------------------------------------------------------------------------------------
+
+NEAREST_COINS: Final = 4
+"""Coins that an observation shows, nearest first."""
+
+
+class CoinTable(NamedTuple):
+    """The K coins of each level; padding lies infinitely far away, behind all others.
+
+    Attributes:
+        total: (L,) how many there are.
+        at: (L, K, 3) their centres, metres, world frame.
+        order: (L, K) their numbers in the order of their x.
+        x: (L, K) their x in that order.
+    """
+
+    total: Int64
+    at: Float64
+    order: Int64
+    x: Float64
+
+
+class CoinState(NamedTuple):
+    """Which coins are collected.
+
+    Attributes:
+        taken: (N, K) which.
+        collected: (N,) how many.
+    """
+
+    taken: Bool
+    collected: Int64
+
+
+def _table(levels: Sequence[ExpandedLevel]) -> CoinTable:
+    at = padded([level.coins for level in levels], (3,), FAR_M)
+    # Stable: coins of one x stay in the order of their numbers, padding behind all.
+    order = np.argsort(at[..., 0], axis=1, kind="stable")
+    return CoinTable(
+        total=np.array([len(level.coins) for level in levels]),
+        at=at,
+        order=order,
+        x=np.take_along_axis(at[..., 0], order, axis=1),
+    )
+
+
+def _state(table: CoinTable, num_envs: int) -> CoinState:
+    taken = np.zeros((num_envs, table.at.shape[1]), dtype=bool)
+    return CoinState(taken, np.zeros(num_envs, dtype=np.int64))
+
+
+@part
+def _react(now: After, table: CoinTable, state: CoinState, own: Own) -> None:
+    """Collect the coins that the ball comes near before its game's end.
+
+    They lie in the order of their x, so only those beside the path are looked at.
+    """
+    low, high = bounds(now.path)
+    x, taken = table.x[now.level], state.taken[now.env]
+    place = np.searchsorted(x, low[0] - COIN_REACH_M)
+    while place < len(x) and x[place] <= high[0] + COIN_REACH_M:
+        coin = table.order[now.level, place]
+        place += 1
+        at = vector(table.at[now.level, coin])
+        if taken[coin] or not meets(low, high, at, POINT, COIN_REACH_M):
+            continue
+        time, _ = visit(now.path, at, POINT, COIN_REACH_M, ANYWHERE, False)
+        if time < np.inf and time <= now.end:
+            taken[coin] = True
+            now.coins[0] += 1
+    state.collected[now.env] += now.coins[0]
+
+
+@part
+def _show(now: Seen, table: CoinTable, state: CoinState, own: Own) -> None:
+    """Write the nearest coins left, nearest first; equal distances go by number.
+
+    The search goes outwards from the ball, along x, and ends where x alone is further than the last
+    of the nearest.
+    """
+    count, ball = table.total[now.level], now.ball
+    if count == 0:
+        return
+    now.out[own.entry] = (count - state.collected[now.env]) / count
+    if np.isnan(ball[0]):
+        return  # No coin is near to nowhere, and the search would not end.
+    nearest, near2 = now.work[:NEAREST_COINS], now.work[NEAREST_COINS : 2 * NEAREST_COINS]
+    for place in range(NEAREST_COINS):
+        nearest[place], near2[place] = count, np.inf
+    x = table.x[now.level, :count]
+    right = np.searchsorted(x, ball[0])
+    left = right - 1
+    while left >= 0 or right < count:
+        back = ball[0] - x[left] if left >= 0 else np.inf
+        ahead = x[right] - ball[0] if right < count else np.inf
+        if min(back, ahead) ** 2 > near2[NEAREST_COINS - 1]:
+            break
+        place = left if back <= ahead else right
+        left -= back <= ahead
+        right += back > ahead
+        coin = table.order[now.level, place]
+        if not state.taken[now.env, coin]:
+            _keep_nearest(coin, distance2(table.at[now.level, coin], ball), nearest, near2)
+    first, present = own.entry + 1, own.entry + 1 + 3 * NEAREST_COINS
+    for place in range(NEAREST_COINS):
+        if nearest[place] < count:
+            show_place(now.out, first + 3 * place, table.at[now.level, int(nearest[place])], ball)
+            now.out[present + place] = 1.0
+
+
+@part
+def _keep_nearest(coin: int, new2: float, nearest: Float64, near2: Float64) -> None:
+    """Put a coin into its place among the nearest, if it is one of them."""
+    place = NEAREST_COINS
+    while place > 0 and (
+        new2 < near2[place - 1] or (new2 == near2[place - 1] and coin < nearest[place - 1])
+    ):
+        place -= 1
+        if place < NEAREST_COINS - 1:
+            near2[place + 1], nearest[place + 1] = near2[place], nearest[place]
+    if place < NEAREST_COINS:
+        near2[place], nearest[place] = new2, coin
+
+
+COIN: Final = Rules(
+    name="coin",
+    table=_table,
+    state=_state,
+    entries=(
+        fraction_entry("coins_left", "share of the level's coins still to collect"),
+        Entry(
+            "coins",
+            3 * NEAREST_COINS,
+            "m",
+            "ball",
+            -np.inf,
+            np.inf,
+            f"x, y, z of the {NEAREST_COINS} nearest coins left, nearest first; else 0",
+        ),
+        fraction_entry("coins_present", "1 where `coins` shows a coin", NEAREST_COINS),
+    ),
+    react=_react,
+    show=_show,
+)
+Coins.rules = COIN

@@ -3,13 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated
+from typing import Annotated, Final, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
+from roller_env.arrays import Float64, Int64
+from roller_env.compiled import part
 from roller_env.pieces.fields import Name, Number, Point, Seconds, Size
-from roller_env.pieces.piece import TOUCHING_M, UNTURNED, Piece, Region, Solid, half_of
+from roller_env.pieces.piece import (
+    TOUCHING_M,
+    UNTURNED,
+    ExpandedLevel,
+    Piece,
+    Region,
+    Solid,
+    half_of,
+)
+from roller_env.pieces.rules import (
+    After,
+    Before,
+    Entry,
+    Own,
+    Rules,
+    Seen,
+    distance2,
+    fraction_entry,
+    padded,
+    place_entry,
+    show_place,
+)
 from roller_env.units import quants
 
 
@@ -58,3 +81,116 @@ def _root(first: list[int], number: int) -> int:
         first[number] = first[first[number]]
         number = first[number]
     return number
+
+
+# Rules --------------------------------------------------------------------------------------------
+
+
+class LiftPadTable(NamedTuple):
+    """Numbers of A pads.
+
+    Attributes:
+        force_n: (L, A) newtons, upwards.
+        duration_s: (L, A) how long each pushes.
+        group: (L, A) number of the first pad of those that push as one; its own, if alone.
+    """
+
+    force_n: Float64
+    duration_s: Float64
+    group: Int64
+
+
+class LiftPadState(NamedTuple):
+    """What varies of A pads.
+
+    Attributes:
+        thrust_s: (N, A) how much longer each pushes the ball up.
+    """
+
+    thrust_s: Float64
+
+
+def _table(levels: Sequence[ExpandedLevel]) -> LiftPadTable:
+    pads = [level.of(LiftPad) for level in levels]
+    return LiftPadTable(
+        force_n=padded([[pad.force_n for pad in row] for row in pads]),
+        duration_s=padded([[pad.duration_s for pad in row] for row in pads]),
+        group=padded([pad_groups(row) for row in pads]).astype(np.int64),
+    )
+
+
+def _state(table: LiftPadTable, num_envs: int) -> LiftPadState:
+    return LiftPadState(np.zeros((num_envs, table.force_n.shape[1])))
+
+
+@part
+def _push(now: Before, table: LiftPadTable, state: LiftPadState, own: Own) -> None:
+    for pad in range(own.regions):
+        acts = min(state.thrust_s[now.env, pad] / now.duration_s, 1.0)
+        now.force_n[2] += acts * table.force_n[now.level, pad]
+
+
+@part
+def _react(now: After, table: LiftPadTable, state: LiftPadState, own: Own) -> None:
+    """Let the timers of pushing pads run, and start those of the pads entered.
+
+    A pad that is still pushing does not fire again, so that its push never lasts longer; nor does
+    one of its group, so that a pad made of two pushes like one.
+    """
+    thrust_s, group = state.thrust_s[now.env], table.group[now.level]
+    entry = now.entry[own.region : own.region + own.regions]
+    for pad in range(own.regions):
+        if entry[pad] < np.inf and _fires(pad, entry, group, thrust_s):
+            thrust_s[pad] = -1.0  # until those behind it have been asked
+    for pad in range(own.regions):
+        left = thrust_s[pad]
+        if left < 0.0:
+            thrust_s[pad] = table.duration_s[now.level, pad]
+        else:
+            left -= now.duration_s
+            # Sums of control steps miss a timer's end by rounding: that is no time at all.
+            thrust_s[pad] = left if left >= 1e-9 else 0.0
+        # The original sets the camera's mode 0 in every frame of the push.
+        now.camera.behind[now.env] |= thrust_s[pad] > 0.0
+
+
+@part
+def _fires(pad: int, entry: Float64, group: Int64, thrust_s: Float64) -> bool:
+    """Say whether none of an entered pad's group is pushing or was entered before it."""
+    for other in range(len(entry)):
+        first = entry[other] < entry[pad] or (entry[other] == entry[pad] and other < pad)
+        if group[other] == group[pad] and (thrust_s[other] > 0.0 or first):
+            return False
+    return True
+
+
+@part
+def _show(now: Seen, table: LiftPadTable, state: LiftPadState, own: Own) -> None:
+    """Write the nearest lift pad, and how much longer one pushes."""
+    best2 = np.inf
+    for pad in range(own.regions):
+        region, left = own.region + pad, np.float32(state.thrust_s[now.env, pad])
+        new2 = distance2(now.centre[region], now.ball)
+        if now.real[region] and new2 < best2:
+            best2 = new2
+            show_place(now.out, own.entry, now.centre[region], now.ball)
+            now.out[own.entry + 3] = 1.0
+        now.out[own.entry + 4] = max(now.out[own.entry + 4], left)
+
+
+LIFT_PAD: Final = Rules(
+    name="lift_pad",
+    table=_table,
+    state=_state,
+    entries=(
+        place_entry("pad", "centre of the nearest lift pad; 0 if none"),
+        fraction_entry("pad_present", "1 where `pad` shows a pad"),
+        Entry(
+            "thrust_left", 1, "s", "-", 0.0, np.inf, "how much longer a lift pad pushes the ball"
+        ),
+    ),
+    push=_push,
+    react=_react,
+    show=_show,
+)
+LiftPad.rules = LIFT_PAD

@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from roller_env.pieces.fields import Part
+
+if TYPE_CHECKING:
+    from roller_env.pieces.rules import Rules
 
 Float64 = npt.NDArray[np.float64]
 Matrix = tuple[tuple[float, float, float], ...]
@@ -95,7 +98,12 @@ class Piece(Part):
     """A kind of thing of which a level has any number, each in the field of its kind.
 
     What a kind does not have it leaves as it is here: nothing.
+
+    Attributes:
+        rules: what the kind does in a game; None for what is only solid.
     """
+
+    rules: ClassVar[Rules[Any, Any] | None] = None
 
     def solids(self, source: str) -> Iterator[Solid]:
         """Yield what of it is solid and stands still.
@@ -120,6 +128,44 @@ class Piece(Part):
             touch: distance of the ball's centre from a surface that it touches, metres.
         """
         return None
+
+
+PieceT = TypeVar("PieceT", bound=Piece)
+
+
+@dataclass(frozen=True, eq=False)
+class ExpandedLevel:
+    """What a level consists of, SI units, world frame, in the order of its pieces.
+
+    Attributes:
+        solids: what stands still.
+        movers: what is solid and moves, where it is at the start.
+        coins: (K, 3) float64 centres, metres.
+        coin_sources: the piece that each coin comes from, as a path such as ``coins[0]``.
+        regions: where pieces act on the ball, by kind of piece.
+        pieces: all of them, by kind.
+    """
+
+    solids: tuple[Solid, ...]
+    movers: tuple[Mover, ...]
+    coins: Float64
+    coin_sources: tuple[str, ...]
+    regions: dict[type[Piece], tuple[Region, ...]]
+    pieces: dict[type[Piece], tuple[Piece, ...]]
+
+    def of(self, kind: type[PieceT]) -> tuple[PieceT, ...]:
+        """Return the pieces of a kind."""
+        return cast("tuple[PieceT, ...]", self.pieces.get(kind, ()))
+
+    @property
+    def ground(self) -> tuple[Solid, ...]:
+        """What stands still and does nothing."""
+        return tuple(solid for solid in self.solids if solid.material)
+
+    @property
+    def at_the_start(self) -> tuple[Solid, ...]:
+        """All that is solid, where it stands at the start."""
+        return (*self.solids, *(mover.solid for mover in self.movers))
 
 
 def rotation_matrix(yaw_deg: float = 0.0, pitch_deg: float = 0.0) -> Matrix:

@@ -22,6 +22,7 @@ from roller_env.config import LevelSource
 from roller_env.drawing.renderer import look
 from roller_env.level import Level, load_level, shipped_levels
 from roller_env.level.expand import expand
+from roller_env.pieces.coin import COIN
 from roller_env.play import panels
 from roller_env.play.camera import PlayerCamera
 from roller_env.play.effects import Flares
@@ -301,13 +302,13 @@ class ScreenPlugin(plugin.ViewerPlugin):  # type: ignore[misc]
             self.camera.reset()
             if frame.falls > before.falls:
                 self._fell_s = frame.clock_s
-        self._flares.watch(frame.state.coin_taken[0], frame.clock_s)
+        self._flares.watch(frame.state.of(COIN).taken[0], frame.clock_s)
 
     def _draw(self, frame: GameFrame, scene: PlayScene, now: float) -> None:
         viewer, qpos = self.viewer, frame.qpos(now)
         elapsed = frame.clock_s - self._shown.clock_s if self._shown is not None else 0.0
         view = self.camera.follow(
-            int(frame.state.camera_mode[0]),
+            int(frame.state.camera.mode[0]),
             qpos[frame.ball : frame.ball + 3],
             elapsed,
         )

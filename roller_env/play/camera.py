@@ -17,6 +17,7 @@ from roller_env.game.cameras import (
     MODE_FRONT,
     MODE_OVERHEAD,
     MODE_RETREAT,
+    CameraState,
     camera_position,
     camera_target,
     retreat,
@@ -79,8 +80,9 @@ class PlayerCamera:
                 self._enter(game_mode)
         self._ball = np.array([ball])
         mode = np.array([self.mode])
-        retreat(mode, self._ball, self._x, duration_s)
-        self.mode = int(mode[0])
+        if self.mode == MODE_RETREAT:
+            retreat(0, duration_s, float(ball[0]), CameraState(mode, self._x))
+            self.mode = int(mode[0])
         position = camera_position(mode, self._ball, self._x)
         return View(position[0], camera_target(mode, self._ball)[0])
 

@@ -15,8 +15,8 @@ from typing import Any, Final
 from mujoco.studio.dear_imgui import dear_imgui as imgui
 
 from roller_env.game.cameras import MODES
-from roller_env.game.rules import INTRO_S, SPLASH_S
 from roller_env.game.state import COIN_ON_PANELS
+from roller_env.game.step import INTRO_S, SPLASH_S
 from roller_env.play.session import GameFrame, Result
 
 Rows = Sequence[tuple[str, str]]

@@ -14,7 +14,6 @@ from mujoco.studio import messages
 from mujoco.studio.dear_imgui import dear_imgui as imgui
 
 from roller_env.compile.compiled import CompiledLevel
-from roller_env.game.state import GameState
 from roller_env.play import panels
 from roller_env.play.app import Choices, GamePlugin, SceneEvent, ScreenPlugin
 from roller_env.play.panels import Choice, Wish
@@ -141,11 +140,11 @@ class ReplaySession:
             made_s=time.monotonic(),
             step_s=step_s,
             ball=self.compiled.ball_qpos,
-            state=GameState(**simulation.state.copy_rows()),
+            state=simulation.state.copy_rows(),
             clock_s=self._scenery_s,
             result=Result(
                 truncated=bool(simulation.state.truncated[0]),
-                coins_in_level=int(simulation.table.coin_count[0]),
+                coins_in_level=int(simulation.coins_in_level[0]),
                 **results,
             ),
             control_in_s=float(simulation.state.control_delay_s[0]),

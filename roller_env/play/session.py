@@ -239,7 +239,7 @@ class GameSession:
         results = {k: v[0].item() for k, v in self.simulation.results(np.array([0])).items()}
         return Result(
             truncated=bool(self.simulation.state.truncated[0]),
-            coins_in_level=int(self.simulation.table.coin_count[0]),
+            coins_in_level=int(self.simulation.coins_in_level[0]),
             **results,
         )
 
@@ -256,7 +256,7 @@ class GameSession:
             made_s=time.monotonic(),
             step_s=self.simulation.duration_s,
             ball=self.compiled.ball_qpos,
-            state=GameState(**state.copy_rows()),
+            state=state.copy_rows(),
             clock_s=self._scenery_s,
             result=self.result,
             control_in_s=float(state.control_delay_s[0]),

@@ -14,6 +14,9 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.pieces.coin import COIN
+from roller_env.pieces.lift_pad import LIFT_PAD
+from roller_env.pieces.plate import PLATE
 from roller_env.simulation import Simulation
 
 Int64 = npt.NDArray[np.int64]
@@ -27,11 +30,11 @@ QUANTITIES: Final[dict[str, Callable[[Simulation], npt.NDArray[Any]]]] = {
     "plate_displacement": lambda game: game.plate_displacement,
     "gate_displacement": lambda game: game.gate_displacement,
     "control_delay": lambda game: game.state.control_delay_s,
-    "coins_collected": lambda game: game.state.coin_taken,
-    "plates_pressed": lambda game: game.state.plate_struck,
-    "plates_down": lambda game: game.state.plate_down,
-    "gates_opening": lambda game: game.state.gate_opening,
-    "lift_time_left": lambda game: game.state.thrust_s,
+    "coins_collected": lambda game: game.state.of(COIN).taken,
+    "plates_pressed": lambda game: game.state.of(PLATE).struck,
+    "plates_down": lambda game: game.state.of(PLATE).down,
+    "gates_opening": lambda game: game.state.signals,
+    "lift_time_left": lambda game: game.state.of(LIFT_PAD).thrust_s,
     "finished": lambda game: game.state.finished,
     "fallen": lambda game: game.state.fallen,
     "diverged": lambda game: game.state.diverged,

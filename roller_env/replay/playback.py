@@ -118,7 +118,7 @@ class Playback:
             step=self.step,
             time_s=self.step * simulation.duration_s,
             qpos=simulation.qpos[0],
-            state=GameState(**simulation.state.copy_rows(_ROW)),
+            state=simulation.state.copy_rows(_ROW),
             force_n=force,
         )
 

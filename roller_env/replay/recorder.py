@@ -11,6 +11,7 @@ import numpy.typing as npt
 from gymnasium.utils import seeding
 
 from roller_env.config import EnvConfig
+from roller_env.pieces.coin import COIN
 from roller_env.replay.actions import actions_of
 from roller_env.replay.checksums import QUANTITIES, Checksums, checksums, interval_of
 from roller_env.replay.contents import MAX_STEPS, Options, Replay, Result, Versions
@@ -81,7 +82,7 @@ class Recorder:
                 f"rows: found {under_way.tolist()} under way; a recording begins right after reset"
             )
         elsewhere = chosen[self._simulation.ball_velocity[chosen].any(axis=1)]
-        elsewhere = np.union1d(elsewhere, chosen[state.coin_taken[chosen].any(axis=1)])
+        elsewhere = np.union1d(elsewhere, chosen[state.of(COIN).taken[chosen].any(axis=1)])
         if len(elsewhere):
             raise ValueError(
                 f"rows: found {elsewhere.tolist()} begun with a moving ball or without coins; what "

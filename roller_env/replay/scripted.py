@@ -18,6 +18,10 @@ from roller_env.game.actions import DIRECTIONS, forces
 from roller_env.game.observations import STATE_ENTRIES, layout
 from roller_env.level import Level
 from roller_env.level.expand import expand
+from roller_env.pieces.coin import COIN
+from roller_env.pieces.gate import GATE
+from roller_env.pieces.lift_pad import LIFT_PAD
+from roller_env.pieces.plate import PLATE
 from roller_env.replay.contents import Replay
 from roller_env.replay.playback import Playback
 from roller_env.simulation import Simulation
@@ -142,13 +146,13 @@ class ScriptedPlayer:
         stop, state = self._stops[self._next], simulation.state
         away = np.abs(stop.at - ball)
         beside = math.hypot(away[0], away[1])
-        is_thrown = bool((state.thrust_s[0] > 0.0).any())
+        is_thrown = bool((state.of(LIFT_PAD).thrust_s[0] > 0.0).any())
         if is_thrown and beside < SHAFT_M and ball[2] > stop.at[2] + STOREY_M:
             return True
         if stop.plate is not None:
-            return bool(state.plate_struck[0, stop.plate])
+            return bool(state.of(PLATE).struck[0, stop.plate])
         if stop.coin is not None:
-            return bool(state.coin_taken[0, stop.coin]) or time_s > self._since_s + PATIENCE_S
+            return bool(state.of(COIN).taken[0, stop.coin]) or time_s > self._since_s + PATIENCE_S
         return beside < REACH_M and bool(away[2] < STOREY_M)
 
     def _speed_through(self, number: int) -> float:
@@ -164,8 +168,9 @@ class ScriptedPlayer:
 
     def _is_shut_off(self, simulation: Simulation, ball: Float64, target: Float64) -> bool:
         """Say whether a gate that is not open yet stands on the way."""
-        moved = simulation.qpos[0, simulation.compiled.gate_qpos]
-        stops = simulation.table.gate_stop[0]
+        own = simulation.table.own(GATE)
+        moved = simulation.gate_displacement[0]
+        stops = simulation.table.mover_stop[0, own.mover : own.mover + own.movers]
         for gate, place, end in zip(self._level.gates, moved, stops, strict=True):
             if place <= end + _OPEN_M:
                 continue

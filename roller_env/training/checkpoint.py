@@ -299,7 +299,8 @@ def _practice(tree: Tree, own: PracticeSnapshot) -> PracticeSnapshot:
 
 
 def _of_snapshot(snapshot: Snapshot) -> Tree:
-    return {name: getattr(snapshot, name) for name in _VARYING}
+    varying = {name: getattr(snapshot, name) for name in _VARYING}
+    return {**varying, "game": snapshot.game.named()}
 
 
 def _snapshot(tree: Tree, own: Snapshot, rows: int) -> Snapshot:
@@ -319,15 +320,16 @@ def _snapshot(tree: Tree, own: Snapshot, rows: int) -> Snapshot:
     # The compiled rules look these up without asking whether they are there.
     for name, numbers, count in (
         ("level_of_row", tree["level_of_row"], 1),
-        ("camera_mode", tree["game"]["camera_mode"], len(MODES)),
-        ("waypoint", tree["game"]["waypoint"], 1 if route is None else len(route.points)),
+        ("camera/mode", tree["game"]["camera/mode"], len(MODES)),
+        ("waypoint", tree["game"]["shaping/waypoint"], 1 if route is None else len(route.points)),
     ):
         if ((numbers < 0) | (numbers >= count)).any():
             raise ValueError(f"{name}: found {numbers.tolist()}; must be 0 to {count - 1}")
     generators = tuple(tree["generators"])
     if len(generators) != rows:
         raise ValueError(f"generators: found {len(generators)}; wanted {rows}")
-    return replace(own, **{**tree, "generators": generators})
+    game = own.game.with_arrays(tree["game"])
+    return replace(own, **{**tree, "game": game, "generators": generators})
 
 
 def _random_state() -> Tree:

@@ -19,6 +19,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from roller_env.envs.sb3 import RollerVecEnv, VecSnapshot
 from roller_env.envs.spaces import shape_observation
+from roller_env.game.state import GameState
 from roller_env.simulation import Snapshot
 
 Int64 = npt.NDArray[np.int64]
@@ -66,7 +67,7 @@ class PracticeStarts(VecEnvWrapper):
     def reset(self) -> Any:
         """Begin every episode at the start."""
         observations = self.environments.reset()
-        self._waypoint[:] = self.environments.simulation.state.waypoint
+        self._waypoint[:] = self.environments.simulation.state.shaping.waypoint
         self._from_start[:] = True
         return observations
 
@@ -85,7 +86,7 @@ class PracticeStarts(VecEnvWrapper):
     def _keep(self, dones: npt.NDArray[np.bool_]) -> None:
         """Keep the games that have just come to a waypoint."""
         simulation = self.environments.simulation
-        waypoint = simulation.state.waypoint
+        waypoint = simulation.state.shaping.waypoint
         for row in np.flatnonzero((waypoint > self._waypoint) & ~dones):
             games = self._games.setdefault(int(waypoint[row]), [])
             if len(games) < _KEPT:
@@ -112,7 +113,7 @@ class PracticeStarts(VecEnvWrapper):
                 values[rows] = fresh[name]
         else:
             observations[rows] = fresh
-        self._waypoint[rows] = simulation.state.waypoint[rows]
+        self._waypoint[rows] = simulation.state.shaping.waypoint[rows]
         self._from_start[rows] = False
 
     def snapshot(self) -> PracticeSnapshot:
@@ -139,7 +140,7 @@ def joined(games: Sequence[Snapshot]) -> Snapshot:
     return replace(
         games[0],
         physics=np.concatenate([game.physics for game in games]),
-        game={name: np.concatenate([game.game[name] for game in games]) for name in games[0].game},
+        game=GameState.joined([game.game for game in games]),
         level_of_row=np.concatenate([game.level_of_row for game in games]),
         generators=tuple(generator for game in games for generator in game.generators),
     )

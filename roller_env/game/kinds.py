@@ -1,0 +1,64 @@
+"""The kinds of pieces that have rules, and their hooks one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from numba import config
+from numba.extending import overload
+
+from roller_env.compiled import part
+from roller_env.level.schema import PIECE_KINDS
+from roller_env.pieces.rules import Hook, Own, Rules, nothing
+
+RULES: Final[tuple[Rules[Any, Any], ...]] = tuple(
+    kind.rules for kind in PIECE_KINDS if kind.rules is not None
+)
+"""In the order in which they act. Tables, states and `Own`s of all kinds are tuples in it."""
+
+AllHooks = Callable[[Any, tuple[Any, ...], tuple[Any, ...], tuple[Own, ...]], None]
+
+
+def all_hooks(name: str) -> AllHooks:
+    """Return a function that calls the hook ``name`` of every kind, in order.
+
+    Compiled, it is that many calls: Numba cannot loop over functions of different types.
+    """
+    hooks: list[Hook] = [getattr(rules, name) for rules in RULES]
+
+    def call(
+        now: Any, tables: tuple[Any, ...], states: tuple[Any, ...], owns: tuple[Own, ...]
+    ) -> None:
+        for hook, table, state, own in zip(hooks, tables, states, owns, strict=True):
+            hook(now, table, state, own)
+
+    if not config.DISABLE_JIT:  # type: ignore[attr-defined]
+        compiled = _chain(hooks)
+
+        # Not strict: of annotated arguments it would find other names.
+        @overload(call, strict=False)
+        def _(now: Any, tables: Any, states: Any, owns: Any) -> AllHooks:
+            return lambda now, tables, states, owns: compiled(now, tables, states, owns)  # noqa: PLW0108
+
+    return call
+
+
+def _chain(hooks: list[Hook]) -> AllHooks:
+    """Return a compiled function that calls the hooks in turn, each with what is its kind's."""
+    chain: AllHooks = part(lambda now, tables, states, owns: None)
+    for number in reversed(range(len(hooks))):
+        if hooks[number] is not nothing:
+            chain = _before(chain, hooks[number], number)
+    return chain
+
+
+def _before(others: AllHooks, hook: Hook, number: int) -> AllHooks:
+    @part
+    def both(
+        now: Any, tables: tuple[Any, ...], states: tuple[Any, ...], owns: tuple[Own, ...]
+    ) -> None:
+        hook(now, tables[number], states[number], owns[number])
+        others(now, tables, states, owns)
+
+    return both
