@@ -68,17 +68,28 @@ def part(function: Callable[_P, _R]) -> Callable[_P, _R]:
     It makes no arrays. So Numba need not count who holds the dozens that are handed from one to the
     other, which took longer than all that is computed; and a graphics card could run it.
     """
-    dispatcher = numba.njit(nogil=True, error_model="numpy", _nrt=False)(function)
-    return cast("Callable[_P, _R]", dispatcher)
+    return cast("Callable[_P, _R]", _jit(function, nogil=True, _nrt=False))
+
+
+def inlined(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Return ``function`` compiled as a `part`, and put where it is called.
+
+    For what is handed dozens of arrays, which would be copied for the call.
+    """
+    return cast("Callable[_P, _R]", _jit(function, nogil=True, _nrt=False, forceinline=True))
 
 
 def _dispatcher(function: Callable[..., Any], **options: bool) -> Any:
     try:
-        return numba.njit(cache=True, error_model="numpy", **options)(function)
+        return _jit(function, cache=True, **options)
     except RuntimeError:
         # Nowhere to write: neither beside the package nor in the user's cache directory.
         _WAIT.kept = False
-        return numba.njit(error_model="numpy", **options)(function)
+        return _jit(function, **options)
+
+
+def _jit(function: Callable[..., Any], **options: Any) -> Any:
+    return numba.njit(error_model="numpy", **options)(function)
 
 
 @cache

@@ -18,7 +18,7 @@ from roller_env.divergence import report
 from roller_env.game import observations, step
 from roller_env.game.bodies import Bodies, Controls
 from roller_env.game.state import GameState, score_percent
-from roller_env.game.step import Game, Reward
+from roller_env.game.step import Games, Rewarding
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level, load_level
 from roller_env.level.check import obstacles, obstructions
@@ -151,12 +151,12 @@ class Simulation:
         self._duration_s = config.substeps * self.compiled.preset.dt_s
         self.table = LevelTable.of_levels([self.compiled.level])
         level_of = np.zeros(num_envs, dtype=np.int64)
-        self._game = Game.of(self.table, level_of, self._episode_lengths(level_of))
-        self.state = self._game.state
+        self._games = Games(self.table, level_of, self._episode_lengths(level_of))
+        self.state = self._games.state
         self._stepper = Stepper(self.compiled.model, num_envs, config.substeps, config.num_threads)
         self._bodies, self._controls = self._views()
-        self._reward = Reward(
-            config.reward_weights.terms, config.reward == "shaped", config.discount
+        self._rewarding = Rewarding(
+            np.array(config.reward_weights.terms), config.reward == "shaped", config.discount
         )
         self._every = np.arange(num_envs)
         self._ray_directions = observations.ray_directions()
@@ -251,7 +251,7 @@ class Simulation:
     @property
     def coins_in_level(self) -> Int64:
         """(N,) how many coins each env's level has."""
-        return self.table.of(COIN).total[self._game.level_of]
+        return self.table.of(COIN).total[self._games.level_of]
 
     @property
     def generators(self) -> tuple[np.random.Generator, ...]:
@@ -311,7 +311,7 @@ class Simulation:
         # In order, as the physics asks for them; every row has its own generator.
         order = np.argsort(rows)
         rows = rows[order]
-        level = self._game.level_of[rows]
+        level = self._games.level_of[rows]
         self._stepper.reset(rows)
         jitter = np.array([self._generators[row].uniform(-1.0, 1.0, 2) for row in rows])
         start = self.table.start[level]
@@ -404,7 +404,7 @@ class Simulation:
         if rows is None or len(rows):
             self._step_rows(rows, force_n)
             every: Int64 | slice = slice(None) if rows is None else rows
-            reward[every] = self._game.step.reward[every]
+            reward[every] = self._games.step.reward[every]
         return Transition(
             reward, self.state.terminated, self.state.truncated.copy(), np.logical_not(idle)
         )
@@ -414,20 +414,22 @@ class Simulation:
         every: Int64 | slice = slice(None) if rows is None else rows
         envs = self._every if rows is None else rows
         before = self._stepper.state[every].copy()
-        step.prepare(self._game, envs, self.duration_s, force_n, self._bodies, self._controls)
-        hanging = self._game.step.hanging_s[every]
+        step.prepare(
+            self._games.preparing, envs, self.duration_s, force_n, self._bodies, self._controls
+        )
+        hanging = self._games.hanging_s[every]
         path = self._let_go(rows, hanging) if hanging.any() else self._stepper.advance(rows)
         diverged = self._stepper.diverged()[every] | ~np.isfinite(path[:, -1]).all(axis=1)
         if diverged.any():
             self._end_diverged(envs[diverged], path, diverged, before)
         ball = self.compiled.ball_qpos
         step.conclude(
-            self._game,
+            self._games.concluding,
             envs,
             self.duration_s,
             path[:, :, ball : ball + 3],
             self._bodies.displacement,
-            self._reward,
+            self._rewarding,
         )
 
     def _let_go(self, rows: Int64 | None, hanging_s: Float64) -> Float64:
@@ -442,9 +444,17 @@ class Simulation:
             rows: (n,).
             follows: (n,) whether the route up to where the ball is counts as passed.
         """
-        if self._reward.shaped and len(rows):
+        if self._rewarding.shaped and len(rows):
             weight = self.config.reward_weights.progress
-            step.follow_route(self._game, rows, self._bodies.position, follows, weight)
+            step.follow_route(
+                self.table.routes,
+                self._games.level_of,
+                rows,
+                self._bodies.position,
+                weight,
+                follows,
+                self.state.shaping,
+            )
 
     def _end_diverged(self, rows: Int64, path: Float64, diverged: Bool, before: Float64) -> None:
         """Report the rows that diverged, and put their physics back to where it is finite.
@@ -466,7 +476,7 @@ class Simulation:
             stacklevel=4,
         )
         self._stepper.reset(rows)
-        self._bodies.position[rows] = self.table.start[self._game.level_of[rows]]
+        self._bodies.position[rows] = self.table.start[self._games.level_of[rows]]
         path[diverged] = self._stepper.qpos[rows][:, None, :]
         self.state.diverged[rows] = True
 
@@ -480,7 +490,7 @@ class Simulation:
         envs = self._every if rows is None else np.asarray(rows)
         size = sum(entry.size for entry in observations.entries(self.config.observation))
         out = np.zeros((len(envs), size), dtype=np.float32)
-        step.observe(self._game, envs, self._bodies, out)
+        step.observe(self._games.showing, envs, self._bodies, out)
         if self.config.observation == "rays":
             out[:, observations.STATE_SIZE :] = self._cast_rays(rows, envs)
         return out
@@ -491,7 +501,7 @@ class Simulation:
         level_rays = self._stepper.rays(level_origins, self._ray_directions, body, rows)
         down = np.broadcast_to([0.0, 0.0, -1.0], self._scan_offsets.shape)
         scan = self._stepper.rays(ball[:, None, :] + self._scan_offsets, down, body, rows)
-        radius = self.table.ball_radius[self._game.level_of[envs]]
+        radius = self.table.ball_radius[self._games.level_of[envs]]
         return observations.ray_observation(level_rays, scan, radius)
 
     def _episode_lengths(self, level_of: Int64) -> Int64:
@@ -510,7 +520,7 @@ class Simulation:
             level=self.compiled.level,
             physics=self._stepper.state[rows].copy(),
             game=self.state.copy_rows(rows),
-            level_of_row=self._game.level_of[rows].copy(),
+            level_of_row=self._games.level_of[rows].copy(),
             generators=tuple(self._generators[row].bit_generator.state for row in rows),
             preset=self.compiled.preset,
             control_dt_s=self.config.control_dt_s,
@@ -532,7 +542,7 @@ class Simulation:
         self._stepper.reset(np.sort(rows))
         self._stepper.state[rows] = snapshot.physics
         self.state.set_rows(rows, snapshot.game)
-        self._game.level_of[rows] = snapshot.level_of_row
+        self._games.level_of[rows] = snapshot.level_of_row
         for row, generator in zip(rows, snapshot.generators, strict=True):
             self._generators[row].bit_generator.state = generator
         # The way is only kept where it is rewarded; elsewhere it is found again, from the first

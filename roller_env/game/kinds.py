@@ -8,7 +8,8 @@ from typing import Any, Final
 from numba import config
 from numba.extending import overload
 
-from roller_env.compiled import part
+from roller_env.arrays import Int64
+from roller_env.compiled import inlined
 from roller_env.level.schema import PIECE_KINDS
 from roller_env.pieces.rules import Hook, Own, Rules, nothing
 
@@ -17,7 +18,7 @@ RULES: Final[tuple[Rules[Any, Any], ...]] = tuple(
 )
 """In the order in which they act. Tables, states and `Own`s of all kinds are tuples in it."""
 
-AllHooks = Callable[[Any, tuple[Any, ...], tuple[Any, ...], tuple[Own, ...]], None]
+AllHooks = Callable[[Any, tuple[Any, ...], tuple[Any, ...], Int64], None]
 
 
 def all_hooks(name: str) -> AllHooks:
@@ -27,11 +28,9 @@ def all_hooks(name: str) -> AllHooks:
     """
     hooks: list[Hook] = [getattr(rules, name) for rules in RULES]
 
-    def call(
-        now: Any, tables: tuple[Any, ...], states: tuple[Any, ...], owns: tuple[Own, ...]
-    ) -> None:
+    def call(now: Any, tables: tuple[Any, ...], states: tuple[Any, ...], owns: Int64) -> None:
         for hook, table, state, own in zip(hooks, tables, states, owns, strict=True):
-            hook(now, table, state, own)
+            hook(now, table, state, Own(*own))
 
     if not config.DISABLE_JIT:  # type: ignore[attr-defined]
         compiled = _chain(hooks)
@@ -46,19 +45,20 @@ def all_hooks(name: str) -> AllHooks:
 
 def _chain(hooks: list[Hook]) -> AllHooks:
     """Return a compiled function that calls the hooks in turn, each with what is its kind's."""
-    chain: AllHooks = part(lambda now, tables, states, owns: None)
+    chain: AllHooks = inlined(lambda now, tables, states, owns: None)
     for number in reversed(range(len(hooks))):
         if hooks[number] is not nothing:
-            chain = _before(chain, hooks[number], number)
+            chain = _before(chain, inlined(hooks[number]), number)
     return chain
 
 
 def _before(others: AllHooks, hook: Hook, number: int) -> AllHooks:
-    @part
-    def both(
-        now: Any, tables: tuple[Any, ...], states: tuple[Any, ...], owns: tuple[Own, ...]
-    ) -> None:
-        hook(now, tables[number], states[number], owns[number])
+    @inlined
+    def both(now: Any, tables: tuple[Any, ...], states: tuple[Any, ...], owns: Int64) -> None:
+        own = Own(
+            owns[number, 0], owns[number, 1], owns[number, 2], owns[number, 3], owns[number, 4]
+        )
+        hook(now, tables[number], states[number], own)
         others(now, tables, states, owns)
 
     return both

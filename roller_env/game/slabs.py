@@ -15,7 +15,7 @@ import numpy as np
 from roller_env.arrays import Float64
 from roller_env.compiled import part
 from roller_env.game.bodies import Bodies
-from roller_env.game.tables import LevelTable
+from roller_env.game.tables import Movers
 
 BRAKING_M_S2: Final = 5.0
 """How hard a slab brakes for a ball under it: a twentieth of what its servo can do, so that it
@@ -32,7 +32,7 @@ def lowering(
     level: int,
     env: int,
     mover: int,
-    table: LevelTable,
+    movers: Movers,
     bodies: Bodies,
 ) -> float:
     """Return the velocity at which a slab that goes down is pulled in the next step, m/s.
@@ -40,18 +40,18 @@ def lowering(
     Below zero is down. Above zero an aim is taken back that lies within the ball, which is then
     touched and not pressed.
     """
-    half, centre = table.mover_half[level, mover], table.mover_centre[level, mover]
+    half, centre = movers.half[level, mover], movers.centre[level, mover]
     slab = bodies.displacement[env, mover]
-    down: float = table.mover_speed[level, mover]
+    down: float = movers.speed[level, mover]
     now, soon = _room_under(
         duration_s,
         centre,
         half,
-        table.mover_heading[level, mover],
+        movers.heading[level, mover],
         centre[2] + slab - half[2],
         bodies.position[env],
         bodies.velocity[env],
-        table.ball_radius[level],
+        movers.ball_radius[level],
     )
     if soon < np.inf:
         room = now if now < 0.0 else max(soon - GAP_M, 0.0)

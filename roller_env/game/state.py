@@ -62,7 +62,7 @@ class GameState(NamedTuple):
         return GameState(
             steps=np.zeros(num_envs, dtype=np.int64),
             control_delay_s=np.zeros(num_envs),
-            touching=flags(table.region_radius.shape[1]),
+            touching=flags(table.regions.radius.shape[1]),
             signals=flags(int(table.gate_count.max())),
             finished=flags(),
             fallen=flags(),

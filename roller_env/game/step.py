@@ -10,20 +10,20 @@ coins and ends with the finish; the fall comes after that.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from roller_env.arrays import Bool, Float32, Float64, Int64
-from roller_env.compiled import compiled_with_packages, part
+from roller_env.compiled import compiled_with_packages, inlined
 from roller_env.game.bodies import Bodies, Controls
 from roller_env.game.cameras import settle
 from roller_env.game.kinds import all_hooks
 from roller_env.game.observations import STATE_SIZE, rotated
-from roller_env.game.rewards import TERMS, next_waypoint, route_progress, shaping
+from roller_env.game.rewards import TERMS, ShapingState, next_waypoint, route_progress, shaping
 from roller_env.game.slabs import lowering
 from roller_env.game.state import GameState
-from roller_env.game.tables import LevelTable
+from roller_env.game.tables import LevelTable, Movers, Regions, Routes
 from roller_env.pieces.rules import WORK, After, Before, CameraAsked, Noticed, Seen
 from roller_env.pieces.sweep import bounds, meets, time_of_fall, vector, visit
 
@@ -41,8 +41,7 @@ a second, which the splash holds up. Until then nothing moves and nothing happen
 
 _COIN, _FINISH, _FALL, _PROGRESS = (TERMS.index(name) for name in TERMS)
 
-_push = all_hooks("push")
-_move = all_hooks("move")
+_act = all_hooks("act")
 _notice = all_hooks("notice")
 _react = all_hooks("react")
 _show = all_hooks("show")
@@ -52,8 +51,6 @@ class Step(NamedTuple):
     """What one control step of N envs leaves behind; written anew in each.
 
     Attributes:
-        moving: (N, M) which slabs go down.
-        hanging_s: (N,) time from the step's beginning until the ball is physical, if it is not.
         live: (N, R) which regions could do something.
         entry: (N, R) physics steps until the ball entered each region and it counted; ``inf`` where
             it did not.
@@ -64,11 +61,8 @@ class Step(NamedTuple):
         terms: (N, terms) what the step has earned, by `roller_env.game.rewards.TERMS`.
         reward: (N,) their sum.
         camera: what was asked of the cameras.
-        work: (N, `WORK`) numbers for a hook to work with.
     """
 
-    moving: Bool
-    hanging_s: Float64
     live: Bool
     entry: Float64
     inside: Bool
@@ -77,66 +71,175 @@ class Step(NamedTuple):
     terms: Float64
     reward: Float64
     camera: CameraAsked
-    work: Float64
 
 
-class Game(NamedTuple):
-    """N games.
-
-    Attributes:
-        levels: what never changes, by level.
-        level_of: (N,) each env's row in it.
-        state: what varies.
-        max_steps: (N,) control steps after which an episode is cut off.
-        step: the last step.
-    """
-
-    levels: LevelTable
-    level_of: Int64
-    state: GameState
-    max_steps: Int64
-    step: Step
-
-    @staticmethod
-    def of(levels: LevelTable, level_of: Int64, max_steps: Int64) -> Game:
-        """Return games of which no episode has begun, so that there is nothing to step."""
-        num_envs, regions = len(level_of), levels.region_radius.shape[1]
-        state = GameState.initial(levels, num_envs)
-        state.truncated[:] = True
-        flags, numbers = np.zeros(num_envs, dtype=bool), np.zeros(num_envs)
-        step = Step(
-            moving=np.zeros((num_envs, levels.mover_stop.shape[1]), dtype=bool),
-            hanging_s=numbers.copy(),
-            live=np.ones((num_envs, regions), dtype=bool),
-            entry=np.full((num_envs, regions), np.inf),
-            inside=np.zeros((num_envs, regions), dtype=bool),
-            end=np.full(num_envs, np.inf),
-            coins=np.zeros((num_envs, 1), dtype=np.int64),
-            terms=np.zeros((num_envs, len(TERMS))),
-            reward=numbers,
-            camera=CameraAsked(np.full(num_envs, -1), flags.copy(), flags),
-            work=np.zeros((num_envs, WORK)),
-        )
-        return Game(levels, level_of, state, max_steps, step)
-
-
-class Reward(NamedTuple):
+class Rewarding(NamedTuple):
     """What a step is worth.
 
     Attributes:
-        weights: by `roller_env.game.rewards.TERMS`.
+        weights: (terms,) by `roller_env.game.rewards.TERMS`.
         shaped: whether progress along the route pays.
         discount: of the shaping.
     """
 
-    weights: tuple[float, float, float, float]
+    weights: Float64
     shaped: bool
     discount: float
 
 
+class Preparing(NamedTuple):
+    """What `prepare` reads and writes of N games.
+
+    Attributes:
+        level_of: (N,) each env's level.
+        movers: of the levels.
+        tables: of the kinds, by level.
+        owns: (kinds, 5) their `Own`s.
+        control_delay_s: (N,) of the state.
+        signals: (N, G) of the state.
+        states: of the kinds, by env.
+        moving: (N, M) written: which slabs go down.
+        hanging_s: (N,) written: time from the step's beginning until the ball is physical, if it is
+            not.
+    """
+
+    level_of: Int64
+    movers: Movers
+    tables: tuple[Any, ...]
+    owns: Int64
+    control_delay_s: Float64
+    signals: Bool
+    states: tuple[Any, ...]
+    moving: Bool
+    hanging_s: Float64
+
+
+class Concluding(NamedTuple):
+    """What `conclude` reads and writes of N games.
+
+    Attributes:
+        level_of: (N,) each env's level.
+        regions: of the levels.
+        routes: of the levels.
+        kill_height: (L,) of the levels.
+        tables: of the kinds, by level.
+        owns: (kinds, 5) their `Own`s.
+        state: written.
+        max_steps: (N,) control steps after which an episode is cut off.
+        hanging_s: (N,) from `prepare`.
+        step: written.
+    """
+
+    level_of: Int64
+    regions: Regions
+    routes: Routes
+    kill_height: Float64
+    tables: tuple[Any, ...]
+    owns: Int64
+    state: GameState
+    max_steps: Int64
+    hanging_s: Float64
+    step: Step
+
+
+class Showing(NamedTuple):
+    """What `observe` reads of N games.
+
+    Attributes:
+        level_of: (N,) each env's level.
+        regions: of the levels.
+        movers: of the levels.
+        tables: of the kinds, by level.
+        owns: (kinds, 5) their `Own`s.
+        steps: (N,) of the state.
+        states: of the kinds, by env.
+        max_steps: (N,) control steps after which an episode is cut off.
+        work: (N, `WORK`) numbers for a hook to work with.
+    """
+
+    level_of: Int64
+    regions: Regions
+    movers: Movers
+    tables: tuple[Any, ...]
+    owns: Int64
+    steps: Int64
+    states: tuple[Any, ...]
+    max_steps: Int64
+    work: Float64
+
+
+class Games:
+    """N games: their levels, their state, and the kernels' views of both.
+
+    Attributes:
+        levels: what never changes, by level.
+        level_of: (N,) each env's row in it.
+        state: what varies. No episode has begun, so that there is nothing to step.
+        step: the last step.
+        hanging_s: (N,) how long the balls hung still in it.
+    """
+
+    def __init__(self, levels: LevelTable, level_of: Int64, max_steps: Int64):
+        """Make games of ``levels``, each cut off after so many control steps, (N,)."""
+        num_envs, regions = len(level_of), levels.regions.radius.shape[1]
+        movers = levels.movers.stop.shape[1]
+        state = GameState.initial(levels, num_envs)
+        state.truncated[:] = True
+
+        def flags(*shape: int) -> Bool:
+            return np.zeros((num_envs, *shape), dtype=bool)
+
+        self.levels, self.level_of, self.state = levels, level_of, state
+        self.hanging_s = np.zeros(num_envs)
+        self.step = Step(
+            live=flags(regions),
+            entry=np.full((num_envs, regions), np.inf),
+            inside=flags(regions),
+            end=np.full(num_envs, np.inf),
+            coins=np.zeros((num_envs, 1), dtype=np.int64),
+            terms=np.zeros((num_envs, len(TERMS))),
+            reward=np.zeros(num_envs),
+            camera=CameraAsked(np.full(num_envs, -1), flags(), flags()),
+        )
+        self.preparing = Preparing(
+            level_of,
+            levels.movers,
+            levels.kinds,
+            levels.owns,
+            state.control_delay_s,
+            state.signals,
+            state.kinds,
+            flags(movers),
+            self.hanging_s,
+        )
+        self.concluding = Concluding(
+            level_of,
+            levels.regions,
+            levels.routes,
+            levels.kill_height,
+            levels.kinds,
+            levels.owns,
+            state,
+            max_steps,
+            self.hanging_s,
+            self.step,
+        )
+        self.showing = Showing(
+            level_of,
+            levels.regions,
+            levels.movers,
+            levels.kinds,
+            levels.owns,
+            state.steps,
+            state.kinds,
+            max_steps,
+            np.zeros((num_envs, WORK)),
+        )
+
+
 @kernel
 def prepare(
-    game: Game,
+    games: Preparing,
     envs: Int64,
     duration_s: float,
     key_force_n: Float64,
@@ -149,43 +252,41 @@ def prepare(
     length of the control step.
 
     Args:
-        game: the games; ``step.moving`` and ``step.hanging_s`` are written.
+        games: all of them.
         envs: (n,) which of them.
         duration_s: of the step.
         key_force_n: (N, 2) newtons, world x and y.
         bodies: where everything is.
         controls: written.
     """
-    state, levels, step = game.state, game.levels, game.step
     for env in envs:
-        level, delay_s = game.level_of[env], state.control_delay_s[env]
+        level, delay_s = games.level_of[env], games.control_delay_s[env]
         # Both delays begin when the level is loaded.
-        step.hanging_s[env] = max(delay_s - (INTRO_S - HANGING_S), 0.0)
+        games.hanging_s[env] = max(delay_s - (INTRO_S - HANGING_S), 0.0)
         held = min(max(1.0 - delay_s / duration_s, 0.0), 1.0)
-        force_n, moving = controls.force_n[env], step.moving[env]
+        force_n, moving = controls.force_n[env], games.moving[env]
         force_n[0] = key_force_n[env, 0] * held
         force_n[1] = key_force_n[env, 1] * held
         force_n[2] = 0.0
         for mover in range(len(moving)):
             moving[mover] = False
-        now = Before(level, env, duration_s, state.signals[env], force_n, moving)
-        _push(now, levels.kinds, state.kinds, levels.owns)
-        _move(now, levels.kinds, state.kinds, levels.owns)
+        now = Before(level, env, duration_s, games.signals[env], force_n, moving)
+        _act(now, games.tables, games.states, games.owns)
         for mover in range(len(moving)):
             velocity = 0.0
             if moving[mover]:
-                velocity = lowering(duration_s, level, env, mover, levels, bodies)
+                velocity = lowering(duration_s, level, env, mover, games.movers, bodies)
             controls.velocity[env, mover] = velocity
 
 
 @kernel
 def conclude(
-    game: Game,
+    games: Concluding,
     envs: Int64,
     duration_s: float,
     path: Float64,
     displacement: Float64,
-    reward: Reward,
+    rewarding: Rewarding,
 ) -> None:
     """Draw the consequences of a step in some envs, and say what it was worth.
 
@@ -193,18 +294,18 @@ def conclude(
     not happen. Where the physics diverged, or the ball hung still, nothing did.
 
     Args:
-        game: the games; their state and ``step`` are written.
+        games: all of them.
         envs: (n,) which of them.
         duration_s: of the step.
         path: (n, S + 1, 3) their balls' centres before the first physics step and after each.
         displacement: (N, M) where the slabs are now.
-        reward: what it is worth.
+        rewarding: what it is worth.
     """
-    state, levels, step = game.state, game.levels, game.step
+    state, step = games.state, games.step
     for number in range(len(envs)):
         env, way = envs[number], path[number]
-        level = game.level_of[env]
-        _find_events(game, level, env, duration_s, way)
+        level = games.level_of[env]
+        _find_events(games, level, env, duration_s, way)
         state.steps[env] += 1
         state.control_delay_s[env] = max(state.control_delay_s[env] - duration_s, 0.0)
         step.coins[env, 0] = 0
@@ -224,41 +325,38 @@ def conclude(
             state.signals[env],
             step.camera,
         )
-        _react(now, levels.kinds, state.kinds, levels.owns)
+        _react(now, games.tables, state.kinds, games.owns)
         settle(env, duration_s, way[-1, 0], step.camera, state.camera)
         for region in range(state.touching.shape[1]):
             state.touching[env, region] = step.inside[env, region]
-        finished = state.finished[env]
-        over = finished or state.fallen[env] or state.diverged[env]
-        state.truncated[env] = not over and state.steps[env] >= game.max_steps[env]
-        _pay(game, level, env, way[-1], over, reward)
+        over = state.finished[env] or state.fallen[env] or state.diverged[env]
+        state.truncated[env] = not over and state.steps[env] >= games.max_steps[env]
+        _pay(games, level, env, way[-1], over, rewarding)
 
 
-@part
-def _find_events(game: Game, level: int, env: int, duration_s: float, path: Float64) -> None:
+@inlined
+def _find_events(games: Concluding, level: int, env: int, duration_s: float, path: Float64) -> None:
     """Write what the ball met on its path before the game's end, and that end."""
-    state, levels, step = game.state, game.levels, game.step
-    entry, inside = step.entry[env], step.inside[env]
-    live = step.live[env]
+    state, regions, step = games.state, games.regions, games.step
+    entry, inside, live = step.entry[env], step.inside[env], step.live[env]
     for region in range(len(entry)):
         entry[region] = np.inf
         inside[region] = False
         live[region] = True
-    if state.diverged[env] or step.hanging_s[env] > duration_s - 1e-9:
+    if state.diverged[env] or games.hanging_s[env] > duration_s - 1e-9:
         step.end[env] = -np.inf
         return
-    _notice(Noticed(level, env, live), levels.kinds, state.kinds, levels.owns)
+    _notice(Noticed(level, env, live), games.tables, state.kinds, games.owns)
     low, high = bounds(path)
     for region in range(len(entry)):
-        centre = vector(levels.region_centre[level, region])
-        half = vector(levels.region_half[level, region])
-        radius = levels.region_radius[level, region]
+        centre, half = vector(regions.centre[level, region]), vector(regions.half[level, region])
+        radius = regions.radius[level, region]
         if live[region] and meets(low, high, centre, half, radius):
-            floor, touching = levels.region_floor[level, region], state.touching[env, region]
+            floor, touching = regions.floor[level, region], state.touching[env, region]
             entry[region], inside[region] = visit(path, centre, half, radius, floor, touching)
-    finish, fall = np.inf, time_of_fall(path, levels.kill_height[level])
-    own = levels.owns[-1]
-    for region in range(own.region, own.region + own.regions):
+    finish, fall = np.inf, time_of_fall(path, games.kill_height[level])
+    first, count = games.owns[-1, 0], games.owns[-1, 1]
+    for region in range(first, first + count):
         finish = min(finish, entry[region])
     end = min(finish, fall)
     step.end[env] = end
@@ -269,76 +367,87 @@ def _find_events(game: Game, level: int, env: int, duration_s: float, path: Floa
             entry[region] = np.inf
 
 
-@part
-def _pay(game: Game, level: int, env: int, ball: Float64, over: bool, reward: Reward) -> None:
+@inlined
+def _pay(
+    games: Concluding, level: int, env: int, ball: Float64, over: bool, rewarding: Rewarding
+) -> None:
     """Write what a step has earned: the coins, the end, and the way along the route."""
-    state, terms = game.state, game.step.terms[env]
-    ended = game.step.end[env] > -np.inf
-    terms[_COIN] = reward.weights[_COIN] * game.step.coins[env, 0]
-    terms[_FINISH] = reward.weights[_FINISH] * (ended and state.finished[env])
-    terms[_FALL] = reward.weights[_FALL] * (ended and state.fallen[env])
+    state, terms, weights = games.state, games.step.terms[env], rewarding.weights
+    counts = games.step.end[env] > -np.inf
+    terms[_COIN] = weights[_COIN] * games.step.coins[env, 0]
+    terms[_FINISH] = weights[_FINISH] * (counts and state.finished[env])
+    terms[_FALL] = weights[_FALL] * (counts and state.fallen[env])
     total = terms[_COIN] + terms[_FINISH] + terms[_FALL]
-    if reward.shaped:
+    if rewarding.shaped:
         before = state.shaping.potential[env]
-        measure(game, level, env, ball, reward.weights[_PROGRESS])
+        _measure(games.routes, level, env, ball, weights[_PROGRESS], True, state.shaping)
         after = state.shaping.potential[env]
-        terms[_PROGRESS] = shaping(before, after, over, reward.discount)
+        terms[_PROGRESS] = shaping(before, after, over, rewarding.discount)
         total += terms[_PROGRESS]
     for term in range(len(terms)):
         state.earned[env, term] += terms[term]
-    game.step.reward[env] = total
+    games.step.reward[env] = total
 
 
-@part
-def measure(game: Game, level: int, env: int, ball: Float64, weight: float) -> None:
-    """Follow the route up to where the ball is, and set the potential to what lies behind it."""
-    levels, shape = game.levels, game.state.shaping
-    route, length = levels.route[level], levels.route_length[level]
-    waypoint = next_waypoint(ball, route, length, levels.route_radius[level], shape.waypoint[env])
-    shape.waypoint[env] = waypoint
-    progress = route_progress(ball, route, levels.route_arc[level], length, waypoint)
-    shape.potential[env] = weight * progress
+@inlined
+def _measure(
+    routes: Routes,
+    level: int,
+    env: int,
+    ball: Float64,
+    weight: float,
+    follows: bool,
+    state: ShapingState,
+) -> None:
+    """Set the potential of where a ball is, perhaps after following the route up to there."""
+    points, length = routes.points[level], routes.length[level]
+    if follows:
+        radius = routes.radius[level]
+        state.waypoint[env] = next_waypoint(ball, points, length, radius, state.waypoint[env])
+    waypoint = state.waypoint[env]
+    progress = route_progress(ball, points, routes.arc[level], length, waypoint)
+    state.potential[env] = weight * progress
 
 
 @kernel
-def follow_route(game: Game, envs: Int64, position: Float64, follows: Bool, weight: float) -> None:
+def follow_route(
+    routes: Routes,
+    level_of: Int64,
+    envs: Int64,
+    position: Float64,
+    weight: float,
+    follows: Bool,
+    state: ShapingState,
+) -> None:
     """Set the potential of envs whose ball was put somewhere.
 
     Args:
-        game: the games.
+        routes: of the levels.
+        level_of: (N,) each env's level.
         envs: (n,) which of them.
         position: (N, 3) balls' centres, metres, world frame.
-        follows: (n,) whether what lies up to there counts as passed.
         weight: potential of a completed route.
+        follows: (n,) whether what lies up to there counts as passed.
+        state: written.
     """
-    levels, shape = game.levels, game.state.shaping
     for number in range(len(envs)):
         env = envs[number]
-        level = game.level_of[env]
-        if follows[number]:
-            measure(game, level, env, position[env], weight)
-        else:
-            route, length = levels.route[level], levels.route_length[level]
-            progress = route_progress(
-                position[env], route, levels.route_arc[level], length, shape.waypoint[env]
-            )
-            shape.potential[env] = weight * progress
+        _measure(routes, level_of[env], env, position[env], weight, follows[number], state)
 
 
 @kernel
-def observe(game: Game, envs: Int64, bodies: Bodies, out: Float32) -> None:
+def observe(games: Showing, envs: Int64, bodies: Bodies, out: Float32) -> None:
     """Write the state vectors of some envs.
 
     Args:
-        game: the games.
+        games: all of them.
         envs: (n,) which of them.
         bodies: where everything is.
         out: (n, `STATE_SIZE` or more) laid out as `STATE_ENTRIES`; zeros.
     """
-    state, levels = game.state, game.levels
     for number in range(len(envs)):
         env, shown = envs[number], out[number]
-        level, ball = game.level_of[env], bodies.position[env]
+        level, ball = games.level_of[env], bodies.position[env]
         turned = rotated(bodies.orientation[env], bodies.angular_velocity[env])
         for axis in range(3):
             shown[axis] = ball[axis]
@@ -348,13 +457,13 @@ def observe(game: Game, envs: Int64, bodies: Bodies, out: Float32) -> None:
             level,
             env,
             ball,
-            levels.region_centre[level],
-            levels.region_real[level],
-            levels.mover_centre[level],
-            levels.mover_stop[level],
+            games.regions.centre[level],
+            games.regions.real[level],
+            games.movers.centre[level],
+            games.movers.stop[level],
             bodies.displacement[env],
-            game.step.work[env],
+            games.work[env],
             shown,
         )
-        _show(now, levels.kinds, state.kinds, levels.owns)
-        shown[STATE_SIZE - 1] = max(1.0 - state.steps[env] / game.max_steps[env], 0.0)
+        _show(now, games.tables, games.states, games.owns)
+        shown[STATE_SIZE - 1] = max(1.0 - games.steps[env] / games.max_steps[env], 0.0)

@@ -21,37 +21,62 @@ from roller_env.pieces.piece import ExpandedLevel, Mover, Piece, Region
 from roller_env.pieces.rules import FAR_M, Own, Rules, TableT, padded
 
 
-class LevelTable(NamedTuple):
-    """Arrays of L levels: SI units, world frame; the regions and movers of each kind are padded.
+class Regions(NamedTuple):
+    """What the balls' paths are tested against, R of them in each of L levels.
 
-    Regions are what the ball's path is tested against: rounded boxes, being all points within
-    ``region_radius`` of the box ``region_centre`` +- ``region_half`` whose height over the centre
-    is more than ``region_floor``. Movers are the slabs that go down. Both stand in the order of
-    `roller_env.game.kinds.RULES`, and ``owns`` says where each kind's are.
+    A region is all points within ``radius`` of the box ``centre`` +- ``half`` whose height over the
+    centre is more than ``floor``.
     """
 
-    region_centre: Float64  # (L, R, 3)
-    region_half: Float64  # (L, R, 3)
-    region_radius: Float64  # (L, R)
-    region_floor: Float64  # (L, R)
-    region_real: Bool  # (L, R) no padding
-    mover_centre: Float64  # (L, M, 3) at the start
-    mover_half: Float64  # (L, M, 3) half edges
-    mover_heading: Float64  # (L, M, 2) cosine and sine of the yaw
-    mover_stop: Float64  # (L, M) displacement at which it has arrived, <= 0
-    mover_speed: Float64  # (L, M) m/s, downwards
+    centre: Float64  # (L, R, 3) metres, world frame
+    half: Float64  # (L, R, 3) half edges
+    radius: Float64  # (L, R)
+    floor: Float64  # (L, R)
+    real: Bool  # (L, R) no padding
+
+
+class Movers(NamedTuple):
+    """The slabs that go down, M of them in each of L levels."""
+
+    centre: Float64  # (L, M, 3) at the start, metres, world frame
+    half: Float64  # (L, M, 3) half edges
+    heading: Float64  # (L, M, 2) cosine and sine of the yaw
+    stop: Float64  # (L, M) displacement at which it has arrived, <= 0; 0 for padding
+    speed: Float64  # (L, M) m/s, downwards
+    ball_radius: Float64  # (L,) of the ball that they must not press
+
+
+class Routes(NamedTuple):
+    """One good way through each of L levels."""
+
+    points: Float64  # (L, W, 3) metres, world frame
+    arc: Float64  # (L, W) metres along the route up to each
+    radius: Float64  # (L,) a leg counts as reached within this distance
+    length: Int64  # (L,) number of points, 0 for none
+
+
+class LevelTable(NamedTuple):
+    """Arrays of L levels: SI units, world frame; what each kind has is padded.
+
+    Regions and movers stand in the order of `roller_env.game.kinds.RULES`; a row of ``owns`` is the
+    `Own` of a kind.
+    """
+
+    regions: Regions
+    movers: Movers
+    routes: Routes
     gate_count: Int64  # (L,)
-    ball_radius: Float64  # (L,)
     kill_height: Float64  # (L,)
     time_limit_s: Float64  # (L,)
     start: Float64  # (L, 3)
     jitter: Float64  # (L, 2)
-    route: Float64  # (L, W, 3)
-    route_arc: Float64  # (L, W) metres along the route up to each waypoint
-    route_radius: Float64  # (L,)
-    route_length: Int64  # (L,) number of waypoints, 0 for none
     kinds: tuple[Any, ...]
-    owns: tuple[Own, ...]
+    owns: Int64  # (kinds, 5)
+
+    @property
+    def ball_radius(self) -> Float64:
+        """(L,) the balls' radii, metres."""
+        return self.movers.ball_radius
 
     @staticmethod
     def of_levels(levels: Sequence[Level]) -> LevelTable:
@@ -68,26 +93,32 @@ class LevelTable(NamedTuple):
             np.array(level.route.points) if level.route else np.zeros((0, 3)) for level in levels
         ]
         return LevelTable(
-            region_centre=region[..., :3],
-            region_half=region[..., 3:6],
-            region_radius=region[..., 6],
-            region_floor=region[..., 7],
-            region_real=region[..., 0] < FAR_M,
-            mover_centre=mover[..., :3],
-            mover_half=mover[..., 3:6],
-            mover_heading=mover[..., 6:8],
-            mover_stop=mover[..., 8],
-            mover_speed=mover[..., 9],
+            regions=Regions(
+                centre=region[..., :3],
+                half=region[..., 3:6],
+                radius=region[..., 6],
+                floor=region[..., 7],
+                real=region[..., 0] < FAR_M,
+            ),
+            movers=Movers(
+                centre=mover[..., :3],
+                half=mover[..., 3:6],
+                heading=mover[..., 6:8],
+                stop=mover[..., 8],
+                speed=mover[..., 9],
+                ball_radius=np.array([level.ball.radius for level in levels]),
+            ),
+            routes=Routes(
+                points=padded(routes, (3,)),
+                arc=padded([_arcs(route) for route in routes]),
+                radius=np.array([level.route.radius if level.route else 0.0 for level in levels]),
+                length=np.array([len(route) for route in routes]),
+            ),
             gate_count=np.array([len(level.gates) for level in levels]),
-            ball_radius=np.array([level.ball.radius for level in levels]),
             kill_height=np.array([level.kill_height for level in levels]),
             time_limit_s=np.array([level.time_limit_s for level in levels]),
             start=np.array([level.start.at for level in levels]),
             jitter=np.array([level.start.jitter for level in levels]),
-            route=padded(routes, (3,)),
-            route_arc=padded([_arcs(route) for route in routes]),
-            route_radius=np.array([level.route.radius if level.route else 0.0 for level in levels]),
-            route_length=np.array([len(route) for route in routes]),
             kinds=tuple(rules.table(expanded) for rules in RULES),
             owns=_owns(_widths(regions), _widths(movers)),
         )
@@ -99,7 +130,7 @@ class LevelTable(NamedTuple):
 
     def own(self, rules: Rules[Any, Any]) -> Own:
         """Return where a kind's regions and movers are."""
-        return self.owns[RULES.index(rules)]
+        return Own(*self.owns[RULES.index(rules)].tolist())
 
 
 def _regions(level: ExpandedLevel, kind: type[Piece]) -> list[list[float]]:
@@ -138,11 +169,11 @@ def _side_by_side(kinds: Sequence[Sequence[Sequence[Any]]], padding: Sequence[fl
     return result
 
 
-def _owns(regions: Sequence[int], movers: Sequence[int]) -> tuple[Own, ...]:
+def _owns(regions: Sequence[int], movers: Sequence[int]) -> Int64:
     entries = layout(STATE_ENTRIES)
     first = [entries[rules.entries[0].name].start if rules.entries else 0 for rules in RULES]
     region, mover = accumulate(regions, initial=0), accumulate(movers, initial=0)
-    return tuple(Own(*own) for own in zip(region, regions, mover, movers, first, strict=False))
+    return np.array(list(zip(region, regions, mover, movers, first, strict=False)))
 
 
 def _arcs(route: Float64) -> Float64:

@@ -112,13 +112,11 @@ def _state(table: CameraTriggerTable, num_envs: int) -> CameraTriggerState:
     )
 
 
-@part
 def _notice(now: Noticed, table: CameraTriggerTable, state: CameraTriggerState, own: Own) -> None:
     for trigger in range(own.regions):
         now.live[own.region + trigger] &= not state.spent[now.env, trigger]
 
 
-@part
 def _react(now: After, table: CameraTriggerTable, state: CameraTriggerState, own: Own) -> None:
     """Let the entries' waits run and the triggers act.
 

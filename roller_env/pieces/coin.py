@@ -168,7 +168,6 @@ def _state(table: CoinTable, num_envs: int) -> CoinState:
     return CoinState(taken, np.zeros(num_envs, dtype=np.int64))
 
 
-@part
 def _react(now: After, table: CoinTable, state: CoinState, own: Own) -> None:
     """Collect the coins that the ball comes near before its game's end.
 
@@ -190,7 +189,6 @@ def _react(now: After, table: CoinTable, state: CoinState, own: Own) -> None:
     state.collected[now.env] += now.coins[0]
 
 
-@part
 def _show(now: Seen, table: CoinTable, state: CoinState, own: Own) -> None:
     """Write the nearest coins left, nearest first; equal distances go by number.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-from roller_env.compiled import part
 from roller_env.pieces.fields import Point, Size
 from roller_env.pieces.piece import Piece, Region, half_of
 from roller_env.pieces.rules import Own, Rules, Seen, no_state, no_table, place_entry, show_place
@@ -24,7 +23,6 @@ class Finish(Piece):
 # Rules: that it ends the game is said in `roller_env.game.step` -----------------------------------
 
 
-@part
 def _show(now: Seen, table: None, state: None, own: Own) -> None:
     show_place(now.out, own.entry, now.centre[own.region], now.ball)
 

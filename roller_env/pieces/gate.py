@@ -7,7 +7,6 @@ from typing import Final
 import numpy as np
 from pydantic import Field
 
-from roller_env.compiled import part
 from roller_env.pieces.fields import Degrees, Length, Name, Point, PositiveLength, Size
 from roller_env.pieces.piece import Mover, Piece, Solid, half_of, rotation_matrix
 from roller_env.pieces.rules import (
@@ -42,13 +41,11 @@ class Gate(Piece):
 # Rules --------------------------------------------------------------------------------------------
 
 
-@part
-def _move(now: Before, table: None, state: None, own: Own) -> None:
+def _act(now: Before, table: None, state: None, own: Own) -> None:
     for gate in range(own.movers):
         now.moving[own.mover + gate] = now.signals[gate]
 
 
-@part
 def _show(now: Seen, table: None, state: None, own: Own) -> None:
     """Write the nearest gate not yet open, where it is now, and how far it has gone."""
     best2 = np.inf
@@ -77,7 +74,7 @@ GATE: Final = Rules(
         fraction_entry("gate_present", "1 where `gate` shows a gate"),
         fraction_entry("gate_lowered", "share of its way down that this gate has gone"),
     ),
-    move=_move,
+    act=_act,
     show=_show,
 )
 Gate.rules = GATE

@@ -123,14 +123,12 @@ def _state(table: LiftPadTable, num_envs: int) -> LiftPadState:
     return LiftPadState(np.zeros((num_envs, table.force_n.shape[1])))
 
 
-@part
-def _push(now: Before, table: LiftPadTable, state: LiftPadState, own: Own) -> None:
+def _act(now: Before, table: LiftPadTable, state: LiftPadState, own: Own) -> None:
     for pad in range(own.regions):
         acts = min(state.thrust_s[now.env, pad] / now.duration_s, 1.0)
         now.force_n[2] += acts * table.force_n[now.level, pad]
 
 
-@part
 def _react(now: After, table: LiftPadTable, state: LiftPadState, own: Own) -> None:
     """Let the timers of pushing pads run, and start those of the pads entered.
 
@@ -164,7 +162,6 @@ def _fires(pad: int, entry: Float64, group: Int64, thrust_s: Float64) -> bool:
     return True
 
 
-@part
 def _show(now: Seen, table: LiftPadTable, state: LiftPadState, own: Own) -> None:
     """Write the nearest lift pad, and how much longer one pushes."""
     best2 = np.inf
@@ -189,7 +186,7 @@ LIFT_PAD: Final = Rules(
             "thrust_left", 1, "s", "-", 0.0, np.inf, "how much longer a lift pad pushes the ball"
         ),
     ),
-    push=_push,
+    act=_act,
     react=_react,
     show=_show,
 )

@@ -9,7 +9,6 @@ import numpy as np
 from pydantic import Field
 
 from roller_env.arrays import Bool, Float64
-from roller_env.compiled import part
 from roller_env.pieces.fields import Length, Name, Point, PositiveLength, Size
 from roller_env.pieces.gate import Gate
 from roller_env.pieces.piece import UNTURNED, ExpandedLevel, Mover, Piece, Region, Solid, half_of
@@ -103,19 +102,16 @@ def _state(table: PlateTable, num_envs: int) -> PlateState:
     return PlateState(np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool))
 
 
-@part
-def _move(now: Before, table: PlateTable, state: PlateState, own: Own) -> None:
+def _act(now: Before, table: PlateTable, state: PlateState, own: Own) -> None:
     for plate in range(own.movers):
         now.moving[own.mover + plate] = state.struck[now.env, plate]
 
 
-@part
 def _notice(now: Noticed, table: PlateTable, state: PlateState, own: Own) -> None:
     for plate in range(own.regions):
         now.live[own.region + plate] &= not state.struck[now.env, plate]
 
 
-@part
 def _react(now: After, table: PlateTable, state: PlateState, own: Own) -> None:
     """Start the plates that were struck, see which have arrived, and open their gates."""
     for plate in range(own.regions):
@@ -128,7 +124,6 @@ def _react(now: After, table: PlateTable, state: PlateState, own: Own) -> None:
                 now.signals[gate] |= table.opens[now.level, plate, gate]
 
 
-@part
 def _show(now: Seen, table: PlateTable, state: PlateState, own: Own) -> None:
     """Write the nearest plate not yet struck, and whether any is sinking."""
     best, best2 = -1, np.inf
@@ -153,7 +148,7 @@ PLATE: Final = Rules(
         fraction_entry("plate_present", "1 where `plate` shows a plate"),
         fraction_entry("plate_sinking", "1 while a struck plate is still sinking"),
     ),
-    move=_move,
+    act=_act,
     notice=_notice,
     react=_react,
     show=_show,

@@ -189,7 +189,6 @@ def fraction_entry(name: str, meaning: str, size: int = 1) -> Entry:
     return Entry(name, size, "-", "-", 0.0, 1.0, meaning)
 
 
-@part
 def nothing(now: Any, table: Any, state: Any, own: Own) -> None:
     """Leave everything as it is."""
 
@@ -212,8 +211,7 @@ class Rules(Generic[TableT, StateT]):
         state: makes, of a table and a number N, the state at the start of an episode: a NamedTuple
             of arrays (N, ...).
         entries: what an observation shows of it.
-        push: a hook with `Before`: adds forces on the ball.
-        move: a hook with `Before`: says which of its movers go.
+        act: a hook with `Before`: adds forces on the ball, and says which of its movers go.
         notice: a hook with `Noticed`: says which of its regions can do something.
         react: a hook with `After`: draws the consequences of a step.
         show: a hook with `Seen`: writes its entries.
@@ -223,8 +221,7 @@ class Rules(Generic[TableT, StateT]):
     table: Callable[[Sequence[ExpandedLevel]], TableT]
     state: Callable[[TableT, int], StateT]
     entries: tuple[Entry, ...] = ()
-    push: Hook = nothing
-    move: Hook = nothing
+    act: Hook = nothing
     notice: Hook = nothing
     react: Hook = nothing
     show: Hook = nothing

@@ -170,7 +170,7 @@ class ScriptedPlayer:
         """Say whether a gate that is not open yet stands on the way."""
         own = simulation.table.own(GATE)
         moved = simulation.gate_displacement[0]
-        stops = simulation.table.mover_stop[0, own.mover : own.mover + own.movers]
+        stops = simulation.table.movers.stop[0, own.mover : own.mover + own.movers]
         for gate, place, end in zip(self._level.gates, moved, stops, strict=True):
             if place <= end + _OPEN_M:
                 continue
