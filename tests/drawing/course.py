@@ -43,12 +43,13 @@ def course(**pieces: Any) -> Level:
     return make_level(**(standard | pieces))
 
 
-def change_state(simulation: Simulation, **arrays: Any) -> None:
-    """Set arrays of the game's state, such as ``coin_taken=True``, in every row."""
+def change_state(simulation: Simulation, arrays: dict[str, Any]) -> None:
+    """Set arrays of the game's state, such as ``{"coin/taken": True}``, in every row."""
     snapshot = simulation.snapshot()
+    state = snapshot.game.named()
     for name, value in arrays.items():
-        snapshot.game[name][:] = value
-    snapshot.game["points"][:] = snapshot.game["coin_taken"].sum(axis=1)
+        state[name][:] = value
+    state["coin/collected"][:] = state["coin/taken"].sum(axis=1)
     simulation.restore(snapshot)
 
 

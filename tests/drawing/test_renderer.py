@@ -78,31 +78,31 @@ def test_one_sees_the_ball_turn_on_the_spot(game: Filmed) -> None:
 
 
 def test_a_taken_coin_is_not_seen_any_more(game: Filmed) -> None:
-    change_state(game.simulation, plate_down=True)
+    change_state(game.simulation, {"plate/down": True})
     there = count(game.picture(), "gold")
-    change_state(game.simulation, coin_taken=True)
+    change_state(game.simulation, {"coin/taken": True})
     assert there > 20
     assert count(game.picture(), "gold") == 0
 
 
 def test_coins_turn_as_time_passes(game: Filmed) -> None:
     before = game.picture()
-    change_state(game.simulation, steps=10)
+    change_state(game.simulation, {"steps": 10})
     assert differing(before, game.picture()) > 10
 
 
 def test_a_gate_is_red_while_it_is_shut_and_not_once_it_opens(game: Filmed) -> None:
     # The ball is partly red too.
     shut = count(game.picture(), "red")
-    change_state(game.simulation, gate_opening=True)
+    change_state(game.simulation, {"signals": True})
     assert count(game.picture(), "red") < shut - 50
 
 
 def test_a_plate_says_whether_it_sinks_or_is_down(game: Filmed) -> None:
     idle = game.picture()
-    change_state(game.simulation, plate_struck=True)
+    change_state(game.simulation, {"plate/struck": True})
     sinking = game.picture()
-    change_state(game.simulation, plate_down=True)
+    change_state(game.simulation, {"plate/down": True})
     down = game.picture()
     assert differing(idle, sinking) > 50
     assert count(down, "green") > count(sinking, "green") + 50
@@ -110,15 +110,15 @@ def test_a_plate_says_whether_it_sinks_or_is_down(game: Filmed) -> None:
 
 def test_a_lift_pad_lights_up_while_it_pushes(game: Filmed) -> None:
     dark = game.picture()
-    change_state(game.simulation, thrust_s=2.0)
+    change_state(game.simulation, {"lift_pad/thrust_s": 2.0})
     lit = game.picture()
     assert differing(dark, lit) > 100
-    change_state(game.simulation, thrust_s=0.0)
+    change_state(game.simulation, {"lift_pad/thrust_s": 0.0})
     assert np.array_equal(game.picture(), dark)
 
 
 def test_every_camera_mode_shows_something_else(game: Filmed) -> None:
-    change_state(game.simulation, camera_x=START[0] - 1.0, camera_mode=MODE_RETREAT)
+    change_state(game.simulation, {"camera/x": START[0] - 1.0, "camera/mode": MODE_RETREAT})
     pictures = [game.picture(mode) for mode in range(len(MODES))]
     for first, second in combinations(pictures, 2):
         assert differing(first, second) > 500
@@ -129,7 +129,7 @@ def test_a_retreat_that_nobody_started_has_ended(game: Filmed) -> None:
 
 
 def test_the_game_camera_is_where_the_game_has_put_it(game: Filmed) -> None:
-    change_state(game.simulation, camera_mode=MODE_FRONT)
+    change_state(game.simulation, {"camera/mode": MODE_FRONT})
     assert np.array_equal(game.renderer.render(0, "game"), game.picture(MODE_FRONT))
 
 
@@ -154,14 +154,14 @@ def test_drawing_changes_nothing_in_the_game() -> None:
 def assert_same_state(first: Simulation, second: Simulation) -> None:
     one, other = first.snapshot(), second.snapshot()
     assert one.physics.tobytes() == other.physics.tobytes()
-    for name, values in one.game.items():
-        assert values.tobytes() == other.game[name].tobytes(), name
+    for name, values in one.game.named().items():
+        assert values.tobytes() == other.game.named()[name].tobytes(), name
 
 
 def test_the_same_state_gives_the_same_picture_however_it_was_reached(game: Filmed) -> None:
     first = game.picture()
     game.play(1.0, "w")
-    change_state(game.simulation, coin_taken=True, gate_opening=True, thrust_s=1.0)
+    change_state(game.simulation, {"coin/taken": True, "signals": True, "lift_pad/thrust_s": 1.0})
     for mode in range(len(MODES)):
         game.picture(mode)
     game.simulation.restore(game.beginning)

@@ -38,7 +38,7 @@ def test_an_info_tells_how_the_game_stands() -> None:
     env.reset(seed=0, options={"coins": [0]})
     for step in range(1, 6):
         info = env.step(0)[4]
-        count = len(env.simulation.table.coin_at[0])
+        count = int(env.simulation.coins_in_level[0])
         assert info["time_s"] == pytest.approx(step * 0.05)
         assert info["coins"] == count - 1
         assert info["score_percent"] == pytest.approx(100 * (count - 1) / count)

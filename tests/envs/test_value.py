@@ -289,7 +289,7 @@ def test_an_episode_cannot_begin_in_one_that_is_over() -> None:
 
 def test_an_episode_begins_where_it_is_told() -> None:
     env = RollerEnv(level="flat", observation="dict")
-    count = len(env.simulation.table.coin_at[0])
+    count = int(env.simulation.coins_in_level[0])
     start = {"position": (1.0, 0.5, 0.45), "velocity": (0.5, -1.0, 0.0), "coins": [0, 2]}
     observation, info = env.reset(seed=1, options={**start, "angular_velocity": [0.0, 3.0, 1.0]})
     np.testing.assert_allclose(observation["position"], [1.0, 0.5, 0.45], rtol=1e-6)
@@ -311,7 +311,7 @@ def test_the_rows_of_a_vector_begin_where_each_is_told() -> None:
     env = RollerVectorEnv(3, level="flat", observation="dict")
     single = RollerEnv(level="flat", observation="dict")
     places = np.array([[0.5, 0.0, 0.45], [1.0, 0.5, 0.45], [1.5, -0.5, 0.45]])
-    left = np.zeros((3, len(env.simulation.table.coin_at[0])), dtype=bool)
+    left = np.zeros((3, int(env.simulation.coins_in_level[0])), dtype=bool)
     left[1, :2] = True
     observation, info = env.reset(seed=7, options={"position": places, "coins": left})
     for row in range(3):
@@ -329,9 +329,9 @@ def test_the_rows_of_a_vector_begin_where_each_is_told() -> None:
 
 def test_a_start_on_the_way_is_paid_no_progress_that_lies_behind_it() -> None:
     env = RollerEnv(**OPTIONS)
-    route = env.simulation.table.route[0]
+    route = env.simulation.table.routes.points[0]
     env.reset(seed=0, options={"position": route[2] + [0.0, 0.0, 0.3]})
-    assert env.simulation.state.waypoint[0] >= 2
+    assert env.simulation.state.shaping.waypoint[0] >= 2
     _, reward, *_ = env.step(0)
     assert abs(reward) < 0.5
 
@@ -343,11 +343,11 @@ def test_a_state_without_a_way_finds_it_where_progress_is_paid() -> None:
         env.reset(seed=3)
         for _ in range(22):
             env.step(1)
-    waypoint = shaped.simulation.state.waypoint[0]
-    assert points.simulation.state.waypoint[0] == 0 < waypoint
+    waypoint = shaped.simulation.state.shaping.waypoint[0]
+    assert points.simulation.state.shaping.waypoint[0] == 0 < waypoint
     other = RollerEnv(**OPTIONS)
     other.set_state(points.get_state())
-    assert other.simulation.state.waypoint[0] == waypoint
+    assert other.simulation.state.shaping.waypoint[0] == waypoint
     assert other.step(1)[1] == shaped.step(1)[1]
 
 

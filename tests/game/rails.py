@@ -3,69 +3,120 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from roller_env.game import rules, sweep
-from roller_env.game.slabs import Bodies
+from roller_env.arrays import Bool, Float64, Int64
+from roller_env.game import step
+from roller_env.game.bodies import Bodies, Controls
+from roller_env.game.rewards import RewardWeights
 from roller_env.game.state import GameState
+from roller_env.game.step import Games, Rewarding
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level
-from tests.builders import Float64, Vector
+from roller_env.pieces.coin import COIN
+from tests.builders import Vector
+
+NEVER = 10**9
+
+
+class Events(NamedTuple):
+    """What happened in a step of N games: see `roller_env.game.step.Step`."""
+
+    entry: Float64
+    inside: Bool
+    end: Float64
+    finished: Bool
+    fallen: Bool
+    coins: Bool
+    collected: Int64
+    terms: Float64
+    reward: Float64
 
 
 class Rails:
     """N games, row i of level ``levels[i]``, whose balls go where they are told.
 
     Attributes:
-        state: the games' state.
-        table: the rows' level data.
+        games: the games.
+        state: their state.
+        table: the levels.
         time_s: how long they have been going.
     """
 
-    def __init__(self, *levels: Level, step_s: float = 0.05):
+    def __init__(
+        self,
+        *levels: Level,
+        step_s: float = 0.05,
+        shaped: bool = False,
+        weights: RewardWeights | None = None,
+    ):
         """Put one game of each level into one table."""
-        self.table = LevelTable.of(levels).for_rows(np.arange(len(levels)))
-        self.state = GameState.initial(self.table)
+        count = len(levels)
+        self.table = LevelTable.of_levels(levels)
+        self.games = Games(self.table, np.arange(count), np.full(count, NEVER))
+        self.state: GameState = self.games.state
+        self.state.truncated[:] = False
         self.step_s = step_s
         self.time_s = 0.0
-        self.plate = np.zeros(self.table.plate_stop.shape)
-        self.gate = np.zeros(self.table.gate_stop.shape)
-        self._ball = self.table.start.copy()
+        movers = self.table.movers.stop.shape[1]
+        slabs = np.zeros((count, movers))
+        # On rails the slabs trail nothing.
+        self.bodies = Bodies(
+            position=self.table.start.copy(),
+            orientation=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+            velocity=np.zeros((count, 3)),
+            angular_velocity=np.zeros((count, 3)),
+            displacement=slabs,
+            aim=slabs,
+        )
+        self.controls = Controls(np.zeros((count, 3)), np.zeros((count, movers)))
+        self._rewarding = Rewarding(np.array((weights or RewardWeights()).terms), shaped, 1.0)
+        self._every = np.arange(count)
 
-    @property
-    def bodies(self) -> Bodies:
-        """Where the balls and slabs are; on rails the slabs trail nothing."""
-        still = np.zeros_like(self._ball)
-        return Bodies(self._ball, still, self.plate, self.gate, self.plate, self.gate)
+    def prepare(self) -> Controls:
+        """Return what the motors do in the next step, without keys."""
+        keys = np.zeros((len(self._every), 2))
+        games = self.games.preparing
+        step.prepare(games, self._every, self.step_s, keys, self.bodies, self.controls)
+        return self.controls
 
-    def follow(self, path: Float64) -> sweep.Events:
+    def follow(self, path: Float64) -> Events:
         """Let one control step pass on a path, (N, S + 1, 3) metres; struck plates sink."""
-        keys = np.zeros((len(path), 2))
-        controls = rules.controls(self.state, self.table, keys, self.bodies, self.step_s)
-        self.plate = np.maximum(
-            self.plate + controls.plate_velocity * self.step_s, self.table.plate_stop
-        )
-        self.gate = np.maximum(
-            self.gate + controls.gate_velocity * self.step_s, self.table.gate_stop
-        )
-        motion = sweep.Motion(path, self.plate, self.step_s)
-        events = sweep.find_events(self.state, self.table, motion)
-        rules.apply(self.state, self.table, motion, events)
-        self._ball = path[:, -1].copy()
+        slabs, before = self.bodies.displacement, self.state.of(COIN).taken.copy()
+        slabs += self.prepare().velocity * self.step_s
+        np.maximum(slabs, self.table.movers.stop, out=slabs)
+        games = self.games.concluding
+        path = np.ascontiguousarray(path, dtype=np.float64)
+        step.conclude(games, self._every, self.step_s, path, slabs, self._rewarding)
+        self.bodies.position[:] = path[:, -1]
         self.time_s += self.step_s
-        return events
+        found = self.games.step
+        return Events(
+            entry=found.entry.copy(),
+            inside=found.inside.copy(),
+            end=found.end.copy(),
+            finished=self.state.finished.copy(),
+            fallen=self.state.fallen.copy(),
+            coins=self.state.of(COIN).taken & ~before,
+            collected=found.coins[:, 0].copy(),
+            terms=found.terms.copy(),
+            reward=found.reward.copy(),
+        )
 
-    def go(self, *points: Vector | Sequence[float]) -> sweep.Events:
+    def go(self, *points: Vector | Sequence[float]) -> Events:
         """Move every ball along straight pieces from where it is in one control step."""
-        way = [self._ball, *(np.broadcast_to(point, self._ball.shape) for point in points)]
-        return self.follow(np.stack(way, axis=1).astype(np.float64))
+        here = self.bodies.position
+        way = [here, *(np.broadcast_to(point, here.shape) for point in points)]
+        return self.follow(np.stack(way, axis=1))
 
     def put(self, *point: float) -> None:
         """Put every ball somewhere without a path."""
-        self._ball = np.tile(np.array(point, dtype=np.float64), (len(self._ball), 1))
+        self.bodies.position[:] = point
 
     def wait(self, seconds: float) -> None:
         """Let time pass with the balls at rest."""
+        here = self.bodies.position
         for _ in range(round(seconds / self.step_s)):
-            self.follow(np.stack([self._ball, self._ball], axis=1))
+            self.follow(np.stack([here, here], axis=1))

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roller_env.game.cameras import MODES, OVERHEAD_WAITS, camera_position, camera_target
+from roller_env.game.cameras import MODES, camera_position, camera_target
 from roller_env.level import Level
+from roller_env.pieces.camera_trigger import OVERHEAD_WAITS
 from tests.builders import Game, make_level, q, resting
 from tests.game.rails import Rails
 
@@ -28,7 +29,7 @@ def box(kind: str, x: float) -> dict[str, Any]:
 
 
 def mode(rails: Rails) -> int:
-    return int(rails.state.camera_mode[0])
+    return int(rails.state.camera.mode[0])
 
 
 # Where they are -----------------------------------------------------------------------------------
@@ -71,7 +72,7 @@ def test_in_first_person_w_stays_forward_wherever_the_ball_rolls(keys: str) -> N
     switch = {"kind": "first_person", "at": resting(), "reach": 0.5}
     game = Game(make_level(camera_triggers=[switch]))
     game.play(1.0, keys)
-    assert game.state.camera_mode[0] == FIRST_PERSON
+    assert game.state.camera.mode[0] == FIRST_PERSON
     ball, number = game.position[None], np.array([FIRST_PERSON])
     eye = camera_position(number, ball, np.zeros(1))
     np.testing.assert_allclose(camera_target(number, ball) - eye, [[1.0, 0.0, 0.0]], atol=1e-12)
@@ -100,7 +101,7 @@ def test_the_overhead_camera_comes_1_667_s_after_the_entry(step_s: float) -> Non
 def test_the_overhead_trigger_acts_on_every_entry() -> None:
     rails = Rails(level_with(box("overhead", 2.0)))
     for _ in range(3):
-        rails.state.camera_mode[:] = FRONT
+        rails.state.camera.mode[:] = FRONT
         rails.go((2.0, 0.0, 100.0))
         rails.wait(1.6)
         assert mode(rails) == FRONT
@@ -113,7 +114,7 @@ def test_the_overhead_trigger_does_not_act_again_while_the_ball_rests_in_it() ->
     rails = Rails(level_with(box("overhead", 2.0)))
     rails.go((2.0, 0.0, 100.0))
     rails.wait(2.0)
-    rails.state.camera_mode[:] = FRONT
+    rails.state.camera.mode[:] = FRONT
     rails.wait(5.0)
     assert mode(rails) == FRONT
 
@@ -134,7 +135,7 @@ def test_an_entry_while_the_overhead_camera_is_still_to_come_counts_too() -> Non
     rails.go((2.0, 0.0, 100.0))
     rails.wait(0.7)
     assert mode(rails) == OVERHEAD, "1.7 s after the first entry"
-    rails.state.camera_mode[:] = FRONT
+    rails.state.camera.mode[:] = FRONT
     rails.wait(0.9)
     assert mode(rails) == FRONT
     rails.wait(0.1)
@@ -154,7 +155,7 @@ def test_every_entry_sets_the_overhead_camera_after_its_own_wait(moments: list[s
     expected = BEHIND
     for step, moment in enumerate([*moments, *[""] * 36]):
         if moment == "front":
-            rails.state.camera_mode[:] = expected = FRONT
+            rails.state.camera.mode[:] = expected = FRONT
         is_in = moment == "in" and (not entries or step - entries[-1] > 1)
         waiting = [entry for entry in entries if step - entry < 34]
         is_in &= len(waiting) < OVERHEAD_WAITS
@@ -173,7 +174,7 @@ def test_more_entries_than_are_kept_still_end_with_the_newest() -> None:
         rails.go((2.0, 0.0, 100.0))
         rails.go(HIGH)
     rails.wait(1.55)
-    rails.state.camera_mode[:] = FRONT
+    rails.state.camera.mode[:] = FRONT
     rails.wait(0.05)
     assert mode(rails) == FRONT
     rails.wait(0.05)
@@ -182,11 +183,11 @@ def test_more_entries_than_are_kept_still_end_with_the_newest() -> None:
 
 def test_the_retreat_trigger_acts_at_once_and_is_then_dead() -> None:
     rails = Rails(level_with(box("retreat", 2.0)))
-    rails.state.camera_mode[:] = FRONT
+    rails.state.camera.mode[:] = FRONT
     rails.go((2.0, 0.0, 100.0))
     assert mode(rails) == RETREAT
     rails.go(HIGH)
-    rails.state.camera_mode[:] = FRONT
+    rails.state.camera.mode[:] = FRONT
     rails.go((2.0, 0.0, 100.0))
     assert mode(rails) == FRONT
 
@@ -196,14 +197,14 @@ def test_the_retreating_camera_goes_back_at_16_quants_a_second_to_100_behind(
     step_s: float,
 ) -> None:
     rails = Rails(level_with(box("retreat", 2.0)), step_s=step_s)
-    rails.state.camera_mode[:] = OVERHEAD
+    rails.state.camera.mode[:] = OVERHEAD
     rails.go((2.0, 0.0, 100.0))
-    began, x = rails.time_s, [float(rails.state.camera_x[0])]
+    began, x = rails.time_s, [float(rails.state.camera.x[0])]
     assert (x[0] - 2.0) / 0.0254 == pytest.approx(-10.0), "it starts where the camera was"
     while mode(rails) == RETREAT:
         assert rails.time_s < 20.0, "the camera never arrived"
         rails.wait(step_s)
-        x.append(float(rails.state.camera_x[0]))
+        x.append(float(rails.state.camera.x[0]))
     np.testing.assert_allclose(np.diff(x) / 0.0254 / step_s, -16.0)
     assert mode(rails) == BEHIND
     assert rails.time_s - began == pytest.approx(90.0 / 16.0, abs=step_s + 1e-9)
@@ -211,7 +212,7 @@ def test_the_retreating_camera_goes_back_at_16_quants_a_second_to_100_behind(
 
 def test_the_retreat_ends_sooner_when_the_ball_runs_away() -> None:
     rails = Rails(level_with(box("retreat", 2.0)))
-    rails.state.camera_mode[:] = OVERHEAD
+    rails.state.camera.mode[:] = OVERHEAD
     rails.go((2.0, 0.0, 100.0))
     rails.go((2.0 + 89 * 0.0254, 0.0, 100.0))
     assert mode(rails) == RETREAT
@@ -239,9 +240,9 @@ def test_nothing_cuts_a_retreat_short_and_it_ends_behind_the_ball(
 ) -> None:
     """The original's loop looks at no mode and then sets 0: neither does a lift pad end it."""
     rails = Rails(level_with(box("retreat", 2.0), *triggers, lift_pads=pads))
-    rails.state.camera_mode[:] = FRONT
+    rails.state.camera.mode[:] = FRONT
     rails.go((2.0, 0.0, 100.0))
-    x = float(rails.state.camera_x[0])
+    x = float(rails.state.camera.x[0])
     assert mode(rails) == RETREAT
     rails.go(BACK_THERE)
     rails.go(HIGH)
@@ -258,7 +259,7 @@ def test_nothing_cuts_a_retreat_short_and_it_ends_behind_the_ball(
 def test_a_first_person_switch_that_the_ball_is_still_in_acts_when_the_retreat_is_over() -> None:
     """The original's switch sets its mode in every frame."""
     rails = Rails(level_with(box("retreat", 2.0), SWITCH | {"at": (2.0, 0.0, 100.0)}))
-    rails.state.camera_mode[:] = OVERHEAD
+    rails.state.camera.mode[:] = OVERHEAD
     rails.go((1.0, 0.0, 100.0))
     rails.go((1.7, 0.0, 100.0))
     assert mode(rails) == RETREAT
@@ -282,7 +283,7 @@ def test_first_person_comes_within_10_quants_of_the_switch(distance_q: float, wi
 def test_first_person_is_set_as_long_as_the_ball_is_near_and_then_stays() -> None:
     rails = Rails(first_person_at(2.0))
     rails.go((2.0, 0.0, 100.0))
-    rails.state.camera_mode[:] = FRONT
+    rails.state.camera.mode[:] = FRONT
     rails.wait(0.05)
     assert mode(rails) == FIRST_PERSON
     rails.go((5.0, 0.0, 100.0))
@@ -322,11 +323,11 @@ def test_a_lift_pad_holds_the_camera_behind_while_it_pushes() -> None:
     rails = Rails(level_with(lift_pads=[pad]))
     rails.go((3.5, 0.0, 100.0))
     for _ in range(90):
-        rails.state.camera_mode[:] = OVERHEAD
+        rails.state.camera.mode[:] = OVERHEAD
         rails.wait(0.05)
         assert mode(rails) == BEHIND
     rails.wait(0.6)
-    rails.state.camera_mode[:] = OVERHEAD
+    rails.state.camera.mode[:] = OVERHEAD
     rails.wait(0.05)
     assert mode(rails) == OVERHEAD, "the push is over"
 
@@ -335,9 +336,9 @@ def test_a_reset_puts_the_camera_behind() -> None:
     switch = {"kind": "first_person", "at": resting(1.0), "reach": 0.5}
     game = Game(make_level(camera_triggers=[switch]))
     game.play(1.0, "w")
-    assert game.state.camera_mode[0] == FIRST_PERSON
+    assert game.state.camera.mode[0] == FIRST_PERSON
     game.simulation.reset()
-    assert game.state.camera_mode[0] == BEHIND
+    assert game.state.camera.mode[0] == BEHIND
 
 
 def test_triggers_have_no_substance() -> None:

@@ -8,9 +8,8 @@ import sys
 from pathlib import Path
 
 USE_A_RULE = """
-import numpy as np
-from roller_env.game.observations import rotated
-rotated(np.ones(4), np.ones(3))
+from roller_env.game.cameras import CameraState, retreat
+retreat(0, 1.0, 0.0, CameraState.initial(1))
 """
 
 NOTHING_CAN_BE_KEPT = """

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from roller_env.game.rules import HANGING_S, INTRO_S
+from roller_env.game.step import HANGING_S, INTRO_S
 from roller_env.level import Level
 from roller_env.level.schema import Ball
 from roller_env.pieces.gate import Gate
-from roller_env.pieces.lift_pad import LiftPad
-from roller_env.pieces.plate import Plate
+from roller_env.pieces.lift_pad import LIFT_PAD, LiftPad
+from roller_env.pieces.plate import PLATE, Plate
 from tests.builders import BALL_RADIUS_M, GRAVITY, Game, coin, make_level, q, resting
 from tests.game.rails import Rails
 
@@ -89,9 +89,9 @@ def test_nothing_happens_while_the_ball_hangs() -> None:
     game = Game(level, control_dt_s=1 / 60)
     game.simulation.reset(intro=True)
     game.play(HANGING_S)
-    assert (game.state.points[0], game.state.thrust_s[0, 0]) == (0, 0.0)
+    assert (game.state.coins[0], game.state.of(LIFT_PAD).thrust_s[0, 0]) == (0, 0.0)
     game.step()
-    assert (game.state.points[0], game.state.thrust_s[0, 0]) == (1, 5.0)
+    assert (game.state.coins[0], game.state.of(LIFT_PAD).thrust_s[0, 0]) == (1, 5.0)
 
 
 def test_games_with_and_without_an_intro_stand_side_by_side() -> None:
@@ -119,21 +119,21 @@ def test_without_the_intro_the_keys_work_at_once() -> None:
 
 # Plates -------------------------------------------------------------------------------------------
 
-PLATE = {"name": "plate", "at": q(0, 0, 72), "size": q(112, 112, 22), "opens": ["gate"]}
+BUTTON = {"name": "plate", "at": q(0, 0, 72), "size": q(112, 112, 22), "opens": ["gate"]}
 GATE = {"name": "gate", "at": q(400, 0, 64), "size": q(16, 128, 224)}
 ON_PLATE = q(0, 0, 83 + 16)
 
 
 def plate_level(**pieces: Any) -> Level:
     """A ball that stands on a plate, and the gate that the plate opens."""
-    plain: dict[str, Any] = {"plates": [PLATE], "gates": [GATE], "start": {"at": ON_PLATE}}
+    plain: dict[str, Any] = {"plates": [BUTTON], "gates": [GATE], "start": {"at": ON_PLATE}}
     return make_level(**plain | pieces)
 
 
 def test_a_plate_sinks_at_1_6_quants_a_second_until_67_quants() -> None:
     game = Game(plate_level())
     game.step()
-    assert game.state.plate_struck[0, 0]
+    assert game.state.of(PLATE).struck[0, 0]
     game.play(1.0)
     before = game.slab("plate")
     game.play(1.0)
@@ -145,9 +145,9 @@ def test_a_plate_sinks_at_1_6_quants_a_second_until_67_quants() -> None:
 def test_a_plates_flag_is_set_only_when_it_is_down() -> None:
     game = Game(plate_level(), control_dt_s=1 / 20)
     game.step()
-    while not game.state.plate_down[0, 0]:
+    while not game.state.of(PLATE).down[0, 0]:
         assert game.slab("plate") / Q > -5.0
-        assert not game.state.gate_opening[0, 0]
+        assert not game.state.signals[0, 0]
         assert game.simulation.time_s[0] < 10.0, "the plate never came down"
         game.step()
     assert game.slab("plate") / Q <= -5.0
@@ -162,17 +162,17 @@ def test_a_plate_is_struck_only_from_more_than_25_quants_above_it(
     rails = Rails(plate_level(start={"at": q(0, 0, 200)}))
     rails.put(*q(-90, 0, 72 + height_q))
     rails.go(q(-56 - 4, 0, 72 + height_q))
-    assert rails.state.plate_struck[0, 0] == counts
+    assert rails.state.of(PLATE).struck[0, 0] == counts
 
 
 def test_a_hit_from_the_side_does_not_count() -> None:
     """The ball rolls against a plate as high as itself and pushes on."""
-    wall = PLATE | {"at": q(100, 0, 13), "size": q(64, 112, 26), "sinks_to": 0.0}
+    wall = BUTTON | {"at": q(100, 0, 13), "size": q(64, 112, 26), "sinks_to": 0.0}
     game = Game(plate_level(plates=[wall], start={"at": resting()}))
     game.play(4.0, "w")
     touches_at = q(100 - 32 - 16, 0, 0)[0]
     assert game.position[0] == pytest.approx(touches_at, abs=1e-3)
-    assert not game.state.plate_struck[0, 0]
+    assert not game.state.of(PLATE).struck[0, 0]
 
 
 def test_a_ball_of_16_quants_counts_only_on_plates_thicker_than_18_quants() -> None:
@@ -183,12 +183,12 @@ def test_a_ball_of_16_quants_counts_only_on_plates_thicker_than_18_quants() -> N
                     "name": "thin",
                     "start": {"at": q(0, 0, 72 + thickness / 2 + 16 + 10)},
                     "finish": {"at": (90, 0, 0), "size": (1, 1, 1)},
-                    "plates": [PLATE | {"size": q(112, 112, thickness)}],
+                    "plates": [BUTTON | {"size": q(112, 112, thickness)}],
                 }
             )
         )
         rails.go(q(0, 0, 72 + thickness / 2 + 16))
-        assert rails.state.plate_struck[0, 0] == counts
+        assert rails.state.of(PLATE).struck[0, 0] == counts
 
 
 def test_a_plate_goes_on_sinking_when_the_ball_leaves() -> None:
@@ -197,27 +197,28 @@ def test_a_plate_goes_on_sinking_when_the_ball_leaves() -> None:
     game.place(q(200, 200, 16))
     game.play(4.0)
     assert game.slab("plate") / Q <= -5.0
-    assert game.state.plate_down[0, 0]
+    assert game.state.of(PLATE).down[0, 0]
 
 
 def test_a_plate_fires_once_while_the_ball_rests_on_it() -> None:
     rails = Rails(plate_level())
-    struck = [rails.go(ON_PLATE).plates[0, 0] for _ in range(100)]
+    region = rails.table.own(PLATE).region
+    struck = [bool(np.isfinite(rails.go(ON_PLATE).entry[0, region])) for _ in range(100)]
     assert struck == [True] + [False] * 99
 
 
 def test_a_struck_plate_is_not_struck_again_when_the_ball_comes_back() -> None:
     rails = Rails(plate_level(start={"at": q(0, 0, 200)}))
-    struck = []
+    region, struck = rails.table.own(PLATE).region, []
     for _ in range(3):
-        struck.append(rails.go(ON_PLATE).plates[0, 0])
+        struck.append(bool(np.isfinite(rails.go(ON_PLATE).entry[0, region])))
         rails.go(q(0, 0, 200))
     assert struck == [True, False, False]
 
 
 def test_gates_wait_and_then_lower_at_32_quants_a_second_until_minus_32() -> None:
     game = Game(plate_level())
-    while not game.state.gate_opening[0, 0]:
+    while not game.state.signals[0, 0]:
         assert abs(game.slab("gate")) < 1e-6, "it waits for the plate"
         assert game.simulation.time_s[0] < 10.0, "the gate never opened"
         game.step()
@@ -231,12 +232,12 @@ def test_gates_wait_and_then_lower_at_32_quants_a_second_until_minus_32() -> Non
 
 def test_a_gate_stops_the_ball_until_it_is_open() -> None:
     start = {"at": q(350, 0, 16)}
-    short = PLATE | {"at": q(0, 0, 70)}
+    short = BUTTON | {"at": q(0, 0, 70)}
     gate = GATE | {"at": q(400, 0, 31), "size": q(16, 128, 60)}
     game = Game(plate_level(plates=[short], gates=[gate], start=start))
     game.play(3.0, "w")
     assert game.position[0] / Q == pytest.approx(400 - 8 - 16, abs=0.1)
-    game.state.plate_struck[:] = True
+    game.state.of(PLATE).struck[:] = True
     game.play(8.0, "w")
     assert game.position[0] / Q > 420
 
@@ -244,8 +245,8 @@ def test_a_gate_stops_the_ball_until_it_is_open() -> None:
 def test_a_plate_opens_only_the_gates_that_it_names() -> None:
     gates = [GATE | {"name": name, "at": q(400, 300 * i, 64)} for i, name in enumerate("abc")]
     plates = [
-        PLATE | {"name": "first", "opens": ["a", "c"]},
-        PLATE | {"name": "second", "at": q(-300, 0, 72), "opens": ["b"]},
+        BUTTON | {"name": "first", "opens": ["a", "c"]},
+        BUTTON | {"name": "second", "at": q(-300, 0, 72), "opens": ["b"]},
     ]
     game = Game(plate_level(plates=plates, gates=gates))
     game.play(8.0)
@@ -257,7 +258,7 @@ def test_a_plate_opens_only_the_gates_that_it_names() -> None:
 
 
 def test_any_one_of_two_plates_opens_their_gate_and_it_lowers_once() -> None:
-    plates = [PLATE, PLATE | {"name": "other", "at": q(-300, 0, 72)}]
+    plates = [BUTTON, BUTTON | {"name": "other", "at": q(-300, 0, 72)}]
     game = Game(plate_level(plates=plates))
     game.play(8.0)
     open_at = game.slab("gate")
@@ -277,7 +278,7 @@ def test_a_coin_is_taken_30_quants_from_the_balls_centre(
     at = np.array([0.0, 0.0, 5.0]) + distance_q * Q * np.array(direction)
     game = Game(make_level(coins=[coin(*at)], start={"at": (0.0, 0.0, 5.0)}, gravity=0.001))
     game.step()
-    assert game.state.points[0] == taken
+    assert game.state.coins[0] == taken
 
 
 def test_a_coin_has_no_substance_and_counts_once() -> None:
@@ -286,14 +287,14 @@ def test_a_coin_has_no_substance_and_counts_once() -> None:
     path = game.play(2.0, "w")
     np.testing.assert_array_equal(path, Game(make_level()).play(2.0, "w"))
     game.play(2.0, "s")
-    assert game.state.points[0] == 1
+    assert game.state.coins[0] == 1
 
 
 def test_all_coins_in_reach_are_taken_at_once() -> None:
     coins = [coin(*resting(0.1 * i)) for i in range(5)]
     game = Game(make_level(coins=coins))
     game.step()
-    assert game.state.points[0] == 5
+    assert game.state.coins[0] == 5
 
 
 # Lift pads ----------------------------------------------------------------------------------------
@@ -311,7 +312,7 @@ def lift_level(**pieces: Any) -> Level:
 def test_a_pad_lifts_1425_quants_while_it_pushes_and_1846_with_the_coast(physics: str) -> None:
     game = Game(lift_level(), physics=physics)
     game.step()
-    assert game.state.thrust_s[0, 0] == 5.0
+    assert game.state.of(LIFT_PAD).thrust_s[0, 0] == 5.0
     ground = game.position[2]
     pushed = game.play(5.0)
     assert (pushed[-1, 2] - ground) / Q == pytest.approx(1425.0, rel=0.01)
@@ -331,12 +332,12 @@ def test_a_pad_pushes_with_12_7_newtons() -> None:
 def test_a_pad_fires_again_when_the_ball_falls_back_on_it() -> None:
     game = Game(lift_level())
     game.play(5.05)
-    assert game.state.thrust_s[0, 0] == 0.0
+    assert game.state.of(LIFT_PAD).thrust_s[0, 0] == 0.0
     fired = 0
     for _ in range(round(12.0 / 0.05)):
-        before = game.state.thrust_s[0, 0]
+        before = game.state.of(LIFT_PAD).thrust_s[0, 0]
         game.step()
-        fired += game.state.thrust_s[0, 0] > before
+        fired += game.state.of(LIFT_PAD).thrust_s[0, 0] > before
     assert fired == 1
     assert game.position[2] > 5.0, "and it lifts the ball again"
 
@@ -350,18 +351,18 @@ def test_a_pad_does_not_fire_while_it_pushes() -> None:
         rails.go(ON_PAD)
     rails.go(q(0, 0, 200))
     pushed = 5.0 - 9 * rails.step_s
-    assert rails.state.thrust_s[0, 0] == pytest.approx(pushed)
+    assert rails.state.of(LIFT_PAD).thrust_s[0, 0] == pytest.approx(pushed)
     rails.wait(pushed)
-    assert rails.state.thrust_s[0, 0] == 0.0
+    assert rails.state.of(LIFT_PAD).thrust_s[0, 0] == 0.0
     rails.go(ON_PAD)
-    assert rails.state.thrust_s[0, 0] == 5.0
+    assert rails.state.of(LIFT_PAD).thrust_s[0, 0] == 5.0
 
 
 def test_a_pad_does_not_fire_again_under_a_ball_that_stays_on_it() -> None:
     """Entering counts, not being there: here the ball is held down."""
     rails = Rails(lift_level())
     rails.wait(12.0)
-    assert rails.state.thrust_s[0, 0] == 0.0
+    assert rails.state.of(LIFT_PAD).thrust_s[0, 0] == 0.0
 
 
 def test_two_pads_have_timers_of_their_own_and_their_forces_add() -> None:
@@ -371,7 +372,7 @@ def test_two_pads_have_timers_of_their_own_and_their_forces_add() -> None:
     rails.put(*q(200, 0, 100))
     rails.wait(1.0)
     rails.go(q(200, 0, 20))
-    np.testing.assert_allclose(rails.state.thrust_s, [[5.0 - 1.05, 5.0]])
+    np.testing.assert_allclose(rails.state.of(LIFT_PAD).thrust_s, [[5.0 - 1.05, 5.0]])
 
 
 HALF = {"size": q(36, 72, 4)}
@@ -396,13 +397,13 @@ def test_pads_that_touch_have_one_timer_and_the_first_one_entered_pushes() -> No
     strong = RIGHT | {"force_n": 40.0, "duration_s": 2.0}
     rails = Rails(lift_level(lift_pads=[LEFT, strong], start={"at": q(100, 0, 20)}))
     rails.go(q(-18, 0, 20))
-    np.testing.assert_array_equal(rails.state.thrust_s, [[0.0, 2.0]])
+    np.testing.assert_array_equal(rails.state.of(LIFT_PAD).thrust_s, [[0.0, 2.0]])
     rails.go(q(-18, 0, 200), q(-18, 0, 20))
-    np.testing.assert_allclose(rails.state.thrust_s, [[0.0, 1.95]])
+    np.testing.assert_allclose(rails.state.of(LIFT_PAD).thrust_s, [[0.0, 1.95]])
     rails.go(q(-18, 0, 200))
     rails.wait(2.0)
     rails.go(q(-18, 0, 20))
-    np.testing.assert_array_equal(rails.state.thrust_s, [[5.0, 0.0]])
+    np.testing.assert_array_equal(rails.state.of(LIFT_PAD).thrust_s, [[5.0, 0.0]])
 
 
 def test_a_pad_is_solid() -> None:
@@ -510,17 +511,17 @@ def test_a_reset_gives_a_fresh_level_with_control_on() -> None:
         lift_pads=[PAD | {"at": q(200, 0, 2)}],
     )
     game = Game(level)
-    fresh = {name: array.copy() for name, array in game.state.copy_rows().items()}
+    fresh = game.state.copy_rows().named()
     first = game.simulation.observe()
     game.play(5.0)
-    assert game.state.points[0] == 1
-    assert game.state.plate_down[0, 0]
+    assert game.state.coins[0] == 1
+    assert game.state.of(PLATE).down[0, 0]
     assert game.slab("gate") < -0.5
     game.place(q(200, 0, 20))
     game.play(0.5)
-    assert game.state.thrust_s[0, 0] > 0.0
+    assert game.state.of(LIFT_PAD).thrust_s[0, 0] > 0.0
     game.simulation.reset()
-    for name, array in game.state.copy_rows().items():
+    for name, array in game.state.named().items():
         np.testing.assert_array_equal(array, fresh[name], err_msg=name)
     np.testing.assert_array_equal(game.simulation.observe(), first)
     assert game.slab("gate") == game.slab("plate") == 0.0
@@ -536,7 +537,7 @@ def test_the_lift_does_not_depend_on_how_often_the_game_is_stepped() -> None:
     rises = []
     for control_dt_s in (1 / 60, 1 / 20, 1 / 10):
         game = Game(lift_level(), control_dt_s)
-        while game.state.thrust_s[0, 0] == 0.0:
+        while game.state.of(LIFT_PAD).thrust_s[0, 0] == 0.0:
             game.step()
         rises.append(game.play(7.0)[:, 2].max())
     assert rises == pytest.approx([rises[0]] * 3, rel=2e-4)
@@ -548,7 +549,7 @@ def test_a_push_that_ends_within_a_step_gives_its_whole_impulse_and_no_more() ->
         game = Game(
             lift_level(lift_pads=[PAD | {"duration_s": 0.33, "force_n": 50.0}]), control_dt_s
         )
-        while game.state.thrust_s[0, 0] == 0.0:
+        while game.state.of(LIFT_PAD).thrust_s[0, 0] == 0.0:
             game.step()
         game.play(0.5)
         speeds.append(game.observed("velocity")[2] + GRAVITY * 0.5)
@@ -566,7 +567,7 @@ def test_the_score_can_be_100_and_counts_more_than_two_digits() -> None:
 def test_the_coins_are_counted_from_the_first_moment() -> None:
     """The original zeroed the counter after the coins had counted themselves."""
     game = Game(make_level(coins=[coin(*resting(5.0)), coin(*resting(-5.0))]))
-    assert game.simulation.table.coin_count[0] == 2
+    assert game.simulation.coins_in_level[0] == 2
     assert game.observed("coins_left")[0] == 1.0
 
 

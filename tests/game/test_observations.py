@@ -13,7 +13,6 @@ from hypothesis.extra import numpy as hnp
 
 from roller_env.game.observations import (
     HORIZONTAL_RAYS,
-    NEAREST_COINS,
     RAY_ENTRIES,
     RAY_RANGE_M,
     SCAN_DEPTH_M,
@@ -21,18 +20,18 @@ from roller_env.game.observations import (
     SCAN_SPACING_M,
     STATE_ENTRIES,
     STATE_SIZE,
-    BallState,
     entries,
     layout,
     ray_directions,
     rotated,
     scan_offsets,
     split,
-    state_observation,
 )
-from roller_env.game.state import GameState
+from roller_env.game.step import observe
 from roller_env.level import load_level, shipped_levels
+from roller_env.pieces.coin import NEAREST_COINS
 from tests.builders import BALL_RADIUS_M, Game, coin, make_level, q, resting
+from tests.game.rails import Rails
 
 # Layout -------------------------------------------------------------------------------------------
 
@@ -139,20 +138,13 @@ def test_whatever_coins_there_are_the_nearest_are_shown(places: list[tuple[int, 
 
 
 def test_a_ball_that_is_nowhere_sees_no_coin_and_does_not_disturb_the_others() -> None:
-    game = Game(make_level(coins=[coin(*resting(2.0)), coin(*resting(7.0))]), num_envs=2)
-    simulation = game.simulation
-    snapshot = simulation.snapshot()
-    ball = BallState(
-        position=np.array([[np.nan, 0.0, 1.0], [1.0, 0.0, 1.0]]),
-        velocity=np.zeros((2, 3)),
-        orientation=np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)),
-        spin=np.zeros((2, 3)),
-        gate=np.zeros((2, 0)),
+    rails = Rails(*[make_level(coins=[coin(*resting(2.0)), coin(*resting(7.0))])] * 2)
+    rails.bodies.position[:] = [[np.nan, 0.0, 1.0], [1.0, 0.0, 1.0]]
+    out = np.zeros((2, STATE_SIZE), dtype=np.float32)
+    observe(rails.games.showing, np.arange(2), rails.bodies, out)
+    np.testing.assert_array_equal(
+        split(out, STATE_ENTRIES)["coins_present"], [[0, 0, 0, 0], [1, 1, 0, 0]]
     )
-    state = GameState(**snapshot.game)
-    limit = np.full(2, 100)
-    shown = split(state_observation(ball, state, simulation.table, limit), STATE_ENTRIES)
-    np.testing.assert_array_equal(shown["coins_present"], [[0, 0, 0, 0], [1, 1, 0, 0]])
 
 
 def test_a_taken_coin_is_not_shown() -> None:
@@ -211,7 +203,7 @@ def test_a_struck_plate_is_sinking_and_the_next_one_is_shown() -> None:
 
 def test_a_gates_way_down_is_shown_and_an_open_one_is_not() -> None:
     game = machine_game()
-    while not game.state.gate_opening[0, 0]:
+    while not game.state.signals[0, 0]:
         game.step()
     game.play(1.5)
     lowered = game.observed("gate_lowered")[0]

@@ -9,15 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roller_env.game.rewards import (
-    RewardWeights,
-    follow_route,
-    points_reward,
-    route_progress,
-    shaping,
-)
-from roller_env.game.state import GameState
-from roller_env.game.tables import LevelTable
+from roller_env.game.rewards import RewardWeights, shaping
 from roller_env.level import Level
 from tests.builders import Game, coin, make_level, resting
 from tests.game.rails import Rails
@@ -37,22 +29,21 @@ class Route:
     """A ball on a route, and its potential: what the simulation does with it in every step."""
 
     def __init__(self, level: Level | None = None):
-        self.table = LevelTable.of([level or route_level()]).for_rows(np.zeros(1, dtype=np.int64))
-        self.state = GameState.initial(self.table)
+        self._rails = Rails(level or route_level(), shaped=True)
+        self.state = self._rails.state
 
     def potential(self, x: float, y: float) -> float:
-        ball = np.array([resting(x, y)])
-        follow_route(self.state, self.table, ball)
-        return float(route_progress(self.state, self.table, ball)[0])
+        self._rails.put(*resting(x, y))
+        self._rails.wait(self._rails.step_s)
+        return float(self.state.shaping.potential[0]) / RewardWeights().progress
 
 
 def shaping_sum(potentials: list[float], discount: float, ends: bool = False) -> float:
     """Return the discounted sum of the shaping along a trajectory of potentials."""
     total = 0.0
     for step, (before, after) in enumerate(pairwise(potentials)):
-        over = np.array([ends and step == len(potentials) - 2])
-        reward = shaping(np.array([before]), np.array([after]), over, discount)
-        total += discount**step * float(reward[0])
+        over = ends and step == len(potentials) - 2
+        total += discount**step * shaping(before, after, over, discount)
     return total
 
 
@@ -69,18 +60,23 @@ def test_a_coin_is_paid_once() -> None:
 
 def test_several_coins_in_one_step_are_all_paid() -> None:
     rails = Rails(make_level(coins=[coin(*resting(0.1 * i)) for i in range(3)]))
-    events = rails.go(resting(0.1))
-    np.testing.assert_array_equal(points_reward(events, RewardWeights(coin=2.0)), [6.0])
-    again = rails.go(resting())
-    np.testing.assert_array_equal(points_reward(again, RewardWeights()), [0.0])
+    assert rails.go(resting(0.1)).terms[0].tolist() == [3.0, 0.0, 0.0, 0.0]
+    assert rails.go(resting()).terms[0].tolist() == [0.0, 0.0, 0.0, 0.0]
+    assert rails.state.earned[0].tolist() == [3.0, 0.0, 0.0, 0.0]
 
 
 def test_the_finish_and_the_fall_are_paid_by_their_weights() -> None:
-    weights = RewardWeights(finish=7.0, fall=-3.0)
-    rails = Rails(make_level(finish={"at": (3.0, 0.0, 0.5), "size": (1, 1, 1)}))
-    np.testing.assert_array_equal(points_reward(rails.go(resting(5.0)), weights), [7.0])
-    rails = Rails(make_level())
-    np.testing.assert_array_equal(points_reward(rails.go((0, 0, -40.0)), weights), [-3.0])
+    weights = RewardWeights(coin=2.0, finish=7.0, fall=-3.0)
+    level = make_level(
+        finish={"at": (3.0, 0.0, 0.5), "size": (1, 1, 1)}, coins=[coin(*resting(1.0))]
+    )
+    rails = Rails(level, weights=weights)
+    events = rails.go(resting(5.0))
+    assert events.terms[0].tolist() == [2.0, 7.0, 0.0, 0.0]
+    assert events.reward.tolist() == [9.0]
+    events = Rails(make_level(), weights=weights).go((0, 0, -40.0))
+    assert events.terms[0].tolist() == [0.0, 0.0, -3.0, 0.0]
+    assert events.reward.tolist() == [-3.0]
 
 
 def test_standing_still_is_worth_no_points() -> None:
@@ -126,9 +122,9 @@ def test_a_waypoint_that_was_missed_does_not_draw_the_ball_back() -> None:
 def test_a_leg_out_of_reach_is_not_skipped_to() -> None:
     route = Route()
     route.potential(15.0, 8.5)
-    assert route.state.waypoint[0] == 0
+    assert route.state.shaping.waypoint[0] == 0
     route.potential(15.0, 9.5)
-    assert route.state.waypoint[0] == 3
+    assert route.state.shaping.waypoint[0] == 3
 
 
 def test_a_level_without_a_route_has_no_progress() -> None:
@@ -138,14 +134,13 @@ def test_a_level_without_a_route_has_no_progress() -> None:
 
 def test_a_shorter_routes_padding_is_never_followed() -> None:
     short = make_level(route={"points": [resting(), resting(4.0)], "radius": 1.0})
-    table = LevelTable.of([short, route_level(), make_level()]).for_rows(np.array([0, 1, 2]))
-    state = GameState.initial(table)
+    rails = Rails(short, route_level(), make_level(), shaped=True)
     for x in (1.0, 4.0, 4.0, 4.0, 4.0):
-        ball = np.tile(resting(x), (3, 1))
-        follow_route(state, table, ball)
-    progress = route_progress(state, table, ball)
+        rails.put(*resting(x))
+        rails.wait(rails.step_s)
+    progress = rails.state.shaping.potential / RewardWeights().progress
     np.testing.assert_allclose(progress, [1.0, 4.0 / WAY_M, 0.0])
-    assert state.waypoint.tolist() == [1, 1, 0]
+    assert rails.state.shaping.waypoint.tolist() == [1, 1, 0]
 
 
 # Shaping ------------------------------------------------------------------------------------------

@@ -9,9 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roller_env.game.rules import controls
-from roller_env.game.tables import FAR_M, Kind, LevelTable
+from roller_env.game.kinds import RULES
+from roller_env.game.observations import STATE_ENTRIES, STATE_SIZE, split
+from roller_env.game.step import Games, observe
+from roller_env.game.tables import LevelTable
 from roller_env.level import Level, load_level, shipped_levels
+from roller_env.pieces.coin import COIN
+from roller_env.pieces.finish import FINISH
+from roller_env.pieces.lift_pad import LIFT_PAD
+from roller_env.pieces.plate import PLATE
+from roller_env.pieces.rules import FAR_M
 from tests.builders import BALL_RADIUS_M, coin, make_level, q, resting
 from tests.game.rails import Rails
 from tests.strategies import levels
@@ -40,7 +47,7 @@ def test_a_coin_reached_in_the_same_instant_as_the_finish_counts() -> None:
     rails = Rails(sky_level(coins=[coin(*at)]))
     rails.put(*at)
     events = rails.go((12.0, 0.0, 100.0))
-    assert events.entry[0, rails.table.slices[Kind.FINISH]] == 0.0
+    assert events.entry[0, rails.table.own(FINISH).region] == 0.0
     assert events.coins.tolist() == [[True]]
     assert events.finished[0]
 
@@ -51,7 +58,7 @@ def test_a_coin_behind_the_finish_does_not_count(ahead_m: float, counts: bool) -
     rails = Rails(sky_level(coins=[coin(*at)]))
     events = rails.go((40.0, 0.0, 100.0))
     assert events.finished[0]
-    assert rails.state.points[0] == counts
+    assert rails.state.coins[0] == counts
 
 
 def test_nothing_behind_the_finish_happens() -> None:
@@ -66,9 +73,9 @@ def test_nothing_behind_the_finish_happens() -> None:
     rails = Rails(level)
     rails.go((40.0, 0.0, 100.64))
     assert rails.state.finished[0]
-    assert not rails.state.plate_struck.any()
-    assert not rails.state.thrust_s.any()
-    assert rails.state.camera_mode[0] == 0
+    assert not rails.state.of(PLATE).struck.any()
+    assert not rails.state.of(LIFT_PAD).thrust_s.any()
+    assert rails.state.camera.mode[0] == 0
 
 
 def test_the_finish_before_the_fall_finishes_and_the_fall_before_the_finish_falls() -> None:
@@ -97,15 +104,17 @@ def test_a_coin_above_the_kill_height_counts_and_one_below_does_not() -> None:
     rails = Rails(level)
     rails.go((0.0, 0.0, 20.0))
     assert rails.state.fallen[0]
-    np.testing.assert_array_equal(rails.state.coin_taken, [[True, False]])
+    np.testing.assert_array_equal(rails.state.of(COIN).taken, [[True, False]])
 
 
 def test_events_at_the_same_moment_have_the_order_of_their_kinds() -> None:
-    assert [kind.name for kind in sorted(Kind)] == [
-        "PLATE",
-        "LIFT_PAD",
-        "TRIGGER",
-        "FINISH",
+    assert [rules.name for rules in RULES] == [
+        "coin",
+        "plate",
+        "gate",
+        "lift_pad",
+        "camera_trigger",
+        "finish",
     ]
 
 
@@ -113,12 +122,9 @@ def test_what_begins_in_a_step_acts_from_the_next() -> None:
     """The task of a step is the one that it began with."""
     pad = {"at": (2.0, 0.0, 100.0), "size": (1.0, 1.0, 1.0)}
     rails = Rails(sky_level(lift_pads=[pad]))
-    keys = np.zeros((1, 2))
-    assert controls(rails.state, rails.table, keys, rails.bodies, 0.05).force_n[0, 2] == 0.0
+    assert rails.prepare().force_n[0, 2] == 0.0
     rails.go((2.0, 0.0, 100.0))
-    assert controls(rails.state, rails.table, keys, rails.bodies, 0.05).force_n[
-        0, 2
-    ] == pytest.approx(12.7)
+    assert rails.prepare().force_n[0, 2] == pytest.approx(12.7)
 
 
 # Side by side -------------------------------------------------------------------------------------
@@ -126,27 +132,29 @@ def test_what_begins_in_a_step_acts_from_the_next() -> None:
 
 def assert_same_games(together: Rails, alone: Rails, row: int) -> None:
     """Compare a row of a padded table with the same level's own table."""
-    for name, theirs in alone.state.copy_rows().items():
-        ours = getattr(together.state, name)[row : row + 1]
+    everything = together.state.named()
+    for name, theirs in alone.state.named().items():
+        ours = everything[name][row : row + 1]
         if name == "touching":
-            for kind in Kind:
-                width = alone.table.width(kind)
-                ours_kind = ours[:, together.table.slices[kind]]
-                theirs_kind = theirs[:, alone.table.slices[kind]]
-                np.testing.assert_array_equal(ours_kind[:, :width], theirs_kind)
-                assert not ours_kind[:, width:].any()
+            for rules in RULES:
+                mine, own = together.table.own(rules), alone.table.own(rules)
+                ours_kind = ours[:, mine.region : mine.region + mine.regions]
+                theirs_kind = theirs[:, own.region : own.region + own.regions]
+                np.testing.assert_array_equal(ours_kind[:, : own.regions], theirs_kind)
+                assert not ours_kind[:, own.regions :].any()
         elif ours.ndim > 1:
             width = theirs.shape[1]
             np.testing.assert_array_equal(ours[:, :width], theirs, err_msg=name)
             rest = ours[:, width:]
-            assert (np.isinf(rest) if name == "camera_delay_s" else rest == 0).all(), name
+            waits = name == "camera_trigger/delay_s"
+            assert (np.isinf(rest) if waits else rest == 0).all(), name
         else:
             np.testing.assert_array_equal(ours, theirs, err_msg=name)
 
 
 def random_walk(rng: np.random.Generator, table: LevelTable, steps: int) -> np.ndarray:
     """Return a path, (steps + 1, 3), from region to region of a table's only level."""
-    places = np.concatenate([table.region_centre[0], table.coin_at[0]])
+    places = np.concatenate([table.regions.centre[0], table.of(COIN).at[0]])
     real = places[places[:, 0] < FAR_M]
     goals = real[rng.integers(len(real), size=steps)] + rng.normal(0.0, 0.5, (steps, 3))
     goals[:, 2] += 0.5
@@ -168,36 +176,43 @@ def test_levels_in_one_table_play_as_each_does_alone(drawn: list[Level], seed: i
                 continue
             events = rails.follow(pieces[row : row + 1])
             assert all_events.end[row] == events.end[0]
-            assert all_events.points[row] == events.points[0] == events.coins[0].sum()
+            assert all_events.collected[row] == events.collected[0] == events.coins[0].sum()
             assert_same_games(together, rails, row)
 
 
 def test_the_shipped_levels_share_a_table() -> None:
     shipped = [load_level(name) for name in shipped_levels()]
-    table = LevelTable.of(shipped)
-    alone = [LevelTable.of([level]) for level in shipped]
-    for row, own in enumerate(alone):
-        for kind in Kind:
-            width = own.width(kind)
-            ours = table.region_centre[row, table.slices[kind]]
-            np.testing.assert_array_equal(ours[:width], own.region_centre[0, own.slices[kind]])
-            assert table.exists(kind)[row].sum() == width
-        count = own.coin_count[0]
-        assert table.coin_count[row] == count
-        np.testing.assert_array_equal(table.coin_at[row, :count], own.coin_at[0])
-        np.testing.assert_array_equal(table.coin_order[row, :count], own.coin_order[0])
-        assert table.route_length[row] == own.route_length[0]
+    table = LevelTable.of_levels(shipped)
+    for row, level in enumerate(shipped):
+        own = LevelTable.of_levels([level])
+        for rules in RULES:
+            mine, theirs = table.own(rules), own.own(rules)
+            ours = table.regions.centre[row, mine.region : mine.region + mine.regions]
+            wanted = own.regions.centre[0, theirs.region : theirs.region + theirs.regions]
+            np.testing.assert_array_equal(ours[: theirs.regions], wanted)
+            real = table.regions.real[row, mine.region : mine.region + mine.regions]
+            assert real.sum() == theirs.regions
+        coins, alone = table.of(COIN), own.of(COIN)
+        count = alone.total[0]
+        assert coins.total[row] == count
+        np.testing.assert_array_equal(coins.at[row, :count], alone.at[0])
+        np.testing.assert_array_equal(coins.order[row, :count], alone.order[0])
+        assert table.routes.length[row] == own.routes.length[0]
 
 
-def test_rows_read_their_levels_data_through_the_rows_level() -> None:
+def test_an_env_plays_the_level_that_it_is_said_to_play() -> None:
     near, far = sky_level(), sky_level(finish={"at": (50.5, 0, 100), "size": (1, 4, 4)})
-    table = LevelTable.of([near, far]).for_rows(np.array([1, 0, 1]))
-    np.testing.assert_array_equal(table.centres(Kind.FINISH)[:, 0, 0], [50.5, 10.5, 50.5])
+    games = Games(LevelTable.of_levels([near, far]), np.array([1, 0, 1]), np.full(3, 100))
+    rails = Rails(near, near, near)
+    out = np.zeros((3, STATE_SIZE), dtype=np.float32)
+    observe(games.showing, np.arange(3), rails.bodies, out)
+    finish = split(out, STATE_ENTRIES)["finish"]
+    np.testing.assert_array_equal(finish[:, 0], [50.5, 10.5, 50.5])
 
 
 def test_a_table_of_no_levels_is_refused() -> None:
     with pytest.raises(ValueError, match="at least one"):
-        LevelTable.of([])
+        LevelTable.of_levels([])
 
 
 def test_a_plate_and_a_gate_of_different_levels_do_not_meet() -> None:
@@ -216,7 +231,7 @@ def test_a_plate_and_a_gate_of_different_levels_do_not_meet() -> None:
     one = make_level(plates=[plate | {"opens": ["a"]}], gates=[gate], start=start)
     rails = Rails(two, one)
     rails.wait(4.0)
-    np.testing.assert_array_equal(rails.state.gate_opening, [[False, True], [True, False]])
+    np.testing.assert_array_equal(rails.state.signals, [[False, True], [True, False]])
 
 
 def test_the_ball_touches_what_it_rests_on() -> None:
@@ -227,4 +242,4 @@ def test_the_ball_touches_what_it_rests_on() -> None:
         x, y, z = resting()
         rails.put(x, y, z + 0.2 + gap)
         rails.wait(0.05)
-        assert bool(rails.state.thrust_s[0, 0] > 0.0) == touches
+        assert bool(rails.state.of(LIFT_PAD).thrust_s[0, 0] > 0.0) == touches

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from roller_env.level import Level
+from roller_env.pieces.plate import PLATE
 from tests.builders import BALL_RADIUS_M, GROUND, Float64, Game, make_level
 
 PRESETS = ("fast", "default", "accurate")
@@ -53,7 +54,7 @@ def let_down(
     begin = 1 + game.simulation.compiled.ball_qpos
     snapshot.physics[:, begin : begin + 3] = places
     game.simulation.restore(snapshot)
-    game.state.gate_opening[:] = True
+    game.state.signals[:] = True
     deepest = np.full(len(places), -np.inf)
     for _ in range(round(seconds / game.simulation.duration_s)):
         push = -np.sign(game.simulation.ball_position[:, :2]) * force_n
@@ -123,7 +124,7 @@ def test_a_plate_that_sinks_onto_the_ball_stops_on_it() -> None:
     level = make_level(plates=[plate | {"sinks_to": 0.0, "speed": 0.5}], gates=[gate])
     for physics in PRESETS:
         game = Game(level, physics=physics)
-        game.state.plate_struck[:] = True
+        game.state.of(PLATE).struck[:] = True
         game.play(2.0)
         assert 0.9 + game.slab("p") == pytest.approx(2 * BALL_RADIUS_M, abs=SINK_M)
         assert game.position[2] == pytest.approx(BALL_RADIUS_M, abs=SINK_M)

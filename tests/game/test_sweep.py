@@ -9,45 +9,60 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from roller_env.game import sweep
-from roller_env.game.state import GameState
-from roller_env.game.sweep import find_entries
-from roller_env.game.tables import Kind, LevelTable
+from roller_env.game.tables import LevelTable
 from roller_env.level import Level
-from roller_env.pieces.coin import COIN_REACH_M
-from roller_env.pieces.plate import PLATE_HIT_HEIGHT_M
+from roller_env.pieces.coin import COIN, COIN_REACH_M
+from roller_env.pieces.lift_pad import LIFT_PAD
+from roller_env.pieces.plate import PLATE, PLATE_HIT_HEIGHT_M
+from roller_env.pieces.sweep import visit
 from tests.builders import BALL_RADIUS_M, Float64, Vector
+from tests.game.rails import Rails
 
 SUBSTEP_S = 1 / 240
 
 
-def table_of(**pieces: object) -> LevelTable:
-    """A table of one level that holds regions and nothing else."""
+def level_of(**pieces: object) -> Level:
+    """A level without ground, unchecked."""
     plain = {
         "name": "regions",
         "start": {"at": (0.0, 0.0, 0.0)},
         "finish": {"at": (900.0, 0.0, 0.0), "size": (1.0, 1.0, 1.0)},
     }
-    table = LevelTable.of([Level.model_validate(plain | pieces)])
-    return table.for_rows(np.zeros(1, dtype=np.int64))
+    return Level.model_validate(plain | pieces)
+
+
+def table_of(**pieces: object) -> LevelTable:
+    """A table of one level that holds regions and nothing else."""
+    return LevelTable.of_levels([level_of(**pieces)])
 
 
 def entries(
     path: Float64, table: LevelTable, touching: np.ndarray | None = None
 ) -> tuple[Float64, np.ndarray]:
     """Return entry times and whether the end lies inside, (M,) each, of one path (S + 1, 3)."""
-    count = table.region_radius.shape[1]
-    before = np.zeros((1, count), dtype=bool) if touching is None else touching
-    times, inside = find_entries(path[None], table, before, np.ones((1, count), dtype=bool))
-    return times[0], inside[0]
+    regions = table.regions
+    count = regions.radius.shape[1]
+    before = np.zeros(count, dtype=bool) if touching is None else touching
+    found = [
+        visit(
+            path,
+            tuple(regions.centre[0, number]),
+            tuple(regions.half[0, number]),
+            float(regions.radius[0, number]),
+            float(regions.floor[0, number]),
+            bool(before[number]),
+        )
+        for number in range(count)
+    ]
+    return np.array([time for time, _ in found]), np.array([inside for _, inside in found])
 
 
 def inside_region(points: Float64, table: LevelTable, index: int) -> np.ndarray:
     """Say which points lie in a region, from its description: independent of the sweep."""
-    relative = points - table.region_centre[0, index]
-    nearest = np.clip(relative, -table.region_half[0, index], table.region_half[0, index])
-    near = ((relative - nearest) ** 2).sum(axis=-1) <= table.region_radius[0, index] ** 2
-    return np.asarray(near & (relative[:, 2] >= table.region_floor[0, index]))
+    relative = points - table.regions.centre[0, index]
+    nearest = np.clip(relative, -table.regions.half[0, index], table.regions.half[0, index])
+    near = ((relative - nearest) ** 2).sum(axis=-1) <= table.regions.radius[0, index] ** 2
+    return np.asarray(near & (relative[:, 2] >= table.regions.floor[0, index]))
 
 
 def coordinates(low: float, high: float) -> st.SearchStrategy[float]:
@@ -101,8 +116,8 @@ def test_entries_are_those_that_dense_sampling_finds(
     table: LevelTable, path: Float64, was_touching: bool
 ) -> None:
     """Sampling may miss the shortest visits; the sweep may not miss what sampling finds."""
-    count = table.region_radius.shape[1]
-    touching = np.full((1, count), was_touching)
+    count = table.regions.radius.shape[1]
+    touching = np.full(count, was_touching)
     times, ends_inside = entries(path, table, touching)
     clock = np.linspace(0.0, len(path) - 1, SAMPLES)
     dense = np.stack([np.interp(clock, range(len(path)), path[:, axis]) for axis in range(3)], 1)
@@ -169,7 +184,7 @@ def test_a_ball_that_grazes_the_corner_of_a_pad_touches_it() -> None:
         corner = 1.0 + distance / np.sqrt(2.0)
         start, end = (corner + 5.0, corner - 5.0, 0.0), (corner - 5.0, corner + 5.0, 0.0)
         times, _ = entries(straight(start, end, substeps=1), table)
-        assert np.isfinite(times[table.slices[Kind.LIFT_PAD]][0]) == meets
+        assert np.isfinite(times[table.own(LIFT_PAD).region]) == meets
 
 
 def test_a_ball_that_starts_inside_enters_at_once_if_it_was_not_there_before() -> None:
@@ -181,8 +196,8 @@ def test_a_ball_that_starts_inside_enters_at_once_if_it_was_not_there_before() -
 
 def test_a_ball_that_was_there_before_does_not_enter_again() -> None:
     table = table_of(camera_triggers=[SPHERE])
-    count = table.region_radius.shape[1]
-    touching = np.ones((1, count), dtype=bool)
+    count = table.regions.radius.shape[1]
+    touching = np.ones(count, dtype=bool)
     times, inside = entries(straight((10.2, 0.0, 0.0), (10.3, 0.0, 0.0)), table, touching)
     assert times[0] == np.inf
     assert inside[0]
@@ -190,7 +205,7 @@ def test_a_ball_that_was_there_before_does_not_enter_again() -> None:
 
 def test_a_ball_that_leaves_and_comes_back_in_one_step_enters_again() -> None:
     table = table_of(camera_triggers=[SPHERE])
-    touching = np.ones((1, table.region_radius.shape[1]), dtype=bool)
+    touching = np.ones(table.regions.radius.shape[1], dtype=bool)
     path = np.array([[10.0, 0, 0], [20.0, 0, 0], [10.0, 0, 0]])
     times, inside = entries(path, table, touching)
     assert times[0] == pytest.approx(2.0 - COIN_REACH_M / 10.0)
@@ -204,19 +219,21 @@ def test_the_first_of_several_entries_counts() -> None:
     assert times[0] == pytest.approx((10.0 - COIN_REACH_M) / 20.0)
 
 
-def test_a_region_that_is_not_live_is_not_entered() -> None:
-    table = table_of(camera_triggers=[SPHERE])
-    live = np.zeros((1, table.region_radius.shape[1]), dtype=bool)
-    path = straight((0.0, 0.0, 0.0), (20.0, 0.0, 0.0))[None]
-    times, inside = find_entries(path, table, live.copy(), live)
-    assert np.isinf(times).all()
-    assert not inside.any()
+def test_a_plate_that_sinks_is_not_entered_again() -> None:
+    plate = {"name": "p", "at": (10.0, 0.0, 0.0), "size": (2.0, 2.0, 1.6), "opens": ["g"]}
+    rails = Rails(level_of(plates=[plate], kill_height=-99.0))
+    rails.put(0.0, 0.0, 1.0)
+    region = rails.table.own(PLATE).region
+    assert np.isfinite(rails.go((20.0, 0.0, 1.0)).entry[0, region])
+    again = rails.go((0.0, 0.0, 1.0))
+    assert np.isinf(again.entry[0, region])
+    assert not again.inside[0, region]
 
 
 def test_a_plates_region_begins_25_quants_over_it() -> None:
     plate = {"name": "p", "at": (0.0, 0.0, 0.0), "size": (2.0, 2.0, 0.6), "opens": ["g"]}
     table = table_of(plates=[plate])
-    index = table.slices[Kind.PLATE].start
+    index = table.own(PLATE).region
     below, above = PLATE_HIT_HEIGHT_M - 1e-6, PLATE_HIT_HEIGHT_M + 1e-6
     side, _ = entries(straight((9.0, 0.0, below), (-9.0, 0.0, below)), table)
     top, _ = entries(straight((9.0, 0.0, above), (-9.0, 0.0, above)), table)
@@ -224,19 +241,8 @@ def test_a_plates_region_begins_25_quants_over_it() -> None:
     assert np.isfinite(top[index])
 
 
-def test_rows_are_swept_each_for_itself() -> None:
-    table = LevelTable.of(
-        [
-            Level.model_validate(
-                {
-                    "name": "one",
-                    "start": {"at": (0.0, 0.0, 0.0)},
-                    "finish": {"at": (900.0, 0.0, 0.0), "size": (1.0, 1.0, 1.0)},
-                    "camera_triggers": [SPHERE],
-                }
-            )
-        ]
-    ).for_rows(np.zeros(3, dtype=np.int64))
+def test_envs_are_swept_each_for_itself() -> None:
+    rails = Rails(*[level_of(camera_triggers=[SPHERE], kill_height=-99.0)] * 3)
     path = np.stack(
         [
             straight((0.0, 0.0, 0.0), (20.0, 0.0, 0.0)),
@@ -244,8 +250,7 @@ def test_rows_are_swept_each_for_itself() -> None:
             straight((20.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
         ]
     )
-    none = np.zeros((3, 2), dtype=bool)
-    times, _ = find_entries(path, table, none, ~none)
+    times = rails.follow(path).entry
     reach = (10.0 - COIN_REACH_M) / 20.0 * 12
     np.testing.assert_allclose(times[:, 0], [reach, np.inf, reach])
 
@@ -256,14 +261,6 @@ crowded = st.tuples(*[st.integers(-6, 6).map(lambda place: place / 2)] * 3)
 """Places on a grid, so that many coins share an x."""
 
 
-def collect(path: Float64, table: LevelTable, taken: np.ndarray | None = None) -> sweep.Events:
-    state = GameState.initial(table)
-    if taken is not None:
-        state.coin_taken[0] = taken
-    plate = np.zeros((1, table.width(Kind.PLATE)))
-    return sweep.find_events(state, table, sweep.Motion(path[None], plate, 0.05))
-
-
 @settings(deadline=None)
 @given(st.lists(crowded, min_size=1, max_size=40), paths(), st.data())
 def test_the_coins_taken_are_those_whose_own_region_is_entered(
@@ -272,22 +269,23 @@ def test_the_coins_taken_are_those_whose_own_region_is_entered(
     """However they lie, and whichever of them are gone already."""
     sphere = {"kind": "first_person", "reach": COIN_REACH_M}
     spheres = table_of(camera_triggers=[sphere | {"at": at} for at in places])
-    entered = np.isfinite(entries(path, spheres)[0][spheres.slices[Kind.TRIGGER]])
+    entered = np.isfinite(entries(path, spheres)[0][: len(places)])
     gone = np.array(data.draw(st.lists(st.booleans(), min_size=len(places), max_size=len(places))))
-    events = collect(path, table_of(coins=[{"at": at} for at in places]), gone)
+    rails = Rails(level_of(coins=[{"at": at} for at in places], kill_height=-99.0))
+    rails.state.of(COIN).taken[0] = gone
+    events = rails.follow(path[None])
     np.testing.assert_array_equal(events.coins[0], entered & ~gone)
-    assert events.points[0] == (entered & ~gone).sum()
+    assert events.collected[0] == (entered & ~gone).sum()
 
 
 def test_a_game_whose_physics_diverged_meets_nothing() -> None:
-    table = table_of(coins=[{"at": COIN_AT}], camera_triggers=[SPHERE], kill_height=5.0)
-    state = GameState.initial(table)
-    state.diverged[:] = True
+    rails = Rails(level_of(coins=[{"at": COIN_AT}], camera_triggers=[SPHERE], kill_height=5.0))
+    rails.state.diverged[:] = True
     path = straight((0.0, 0.0, 9.0), COIN_AT)[None]
-    motion = sweep.Motion(path, np.zeros((1, 0)), 0.05)
-    events = sweep.find_events(state, table, motion)
-    for met in (events.coins, events.triggers, events.inside, events.finished, events.fallen):
+    events = rails.follow(path)
+    assert np.isinf(events.entry).all()
+    for met in (events.coins, events.inside, events.finished, events.fallen):
         assert not met.any()
-    state.diverged[:] = False
-    events = sweep.find_events(state, table, motion)
+    rails.state.diverged[:] = False
+    events = rails.follow(path)
     assert events.fallen[0]

@@ -205,7 +205,7 @@ def test_the_same_game_is_played_to_the_bit_among_60_boxes_and_600() -> None:
 @pytest.mark.parametrize("coins", [0, 9, 10_000])
 def test_a_level_of_coins_has_as_many(coins: int) -> None:
     env = RollerVectorEnv(1, level=level_of_coins(coins), num_threads=1)
-    assert env.simulation.table.coin_count.tolist() == [coins]
+    assert env.simulation.coins_in_level.tolist() == [coins]
 
 
 def test_impossible_sizes_are_refused() -> None:

@@ -88,7 +88,7 @@ def test_its_positions_are_those_of_the_simulation(hall: Shown) -> None:
 def test_a_collected_coin_is_gone(hall: Shown) -> None:
     name = part("coin", 0) + " gold/"
     assert hall.is_seen(name)
-    change_state(hall.simulation, coin_taken=True)
+    change_state(hall.simulation, {"coin/taken": True})
     hall.show()
     assert not hall.is_seen(name)
 
@@ -115,7 +115,7 @@ def test_a_coin_turns_by_the_clock(hall: Shown) -> None:
 def test_exactly_the_puppet_of_the_state_is_seen(
     hall: Shown, kind: str, name: str, arrays: dict[str, object], state: str
 ) -> None:
-    change_state(hall.simulation, **arrays)
+    change_state(hall.simulation, {})
     hall.show()
     states = ("idle", "active") if kind == "pad" else ("idle", "active", "done")
     seen = [other for other in states if hall.is_seen(f"{name} {kind}/{other}")]
@@ -139,7 +139,7 @@ def test_the_bands_run_up_a_retreat_triggers_pane_until_it_is_dead(hall: Shown) 
     for clock_s in np.linspace(0.0, 1.0, 101):
         hall.show(clock_s)
         assert abs(hall.place(name)[2] - 1.0) < 1.0, "within the pane"
-    change_state(hall.simulation, trigger_spent=True)
+    change_state(hall.simulation, {"camera_trigger/spent": True})
     hall.show()
     assert not hall.is_seen(name)
 

@@ -98,8 +98,8 @@ def test_the_same_actions_give_agents_the_same_bits_whatever_the_frames(
     for force in witness.forces[-1]:
         simulation.step(force)
     assert (simulation.qpos == session.simulation.qpos).all()
-    for name, values in simulation.state.copy_rows().items():
-        assert (values == session.simulation.state.copy_rows()[name]).all(), name
+    for name, values in simulation.state.named().items():
+        assert (values == session.simulation.state.named()[name]).all(), name
 
 
 def test_an_environment_with_held_keys_plays_the_same_game() -> None:

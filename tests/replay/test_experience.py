@@ -11,7 +11,7 @@ import pytest
 
 from roller_env.envs.single import RollerEnv
 from roller_env.game.actions import forces
-from roller_env.game.rules import INTRO_S
+from roller_env.game.step import INTRO_S
 from roller_env.replay import ReplayError, record_episode
 from roller_env.replay import experience as experience_module
 from roller_env.replay.checksums import row_count

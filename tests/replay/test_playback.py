@@ -70,7 +70,7 @@ def test_there_is_a_frame_for_every_moment_with_what_is_drawn_in_it() -> None:
     assert [frame.step for frame in shown] == list(range(len(played) + 1))
     assert shown[0].qpos[:3].tolist() == list(played.start)
     assert np.array_equal([frame.force_n for frame in shown[:-1]], played.force_n)
-    assert shown[-1].state.points[0] == played.result.coins
+    assert shown[-1].state.coins[0] == played.result.coins
     assert shown[-1].state.fallen[0] == played.result.fall
     assert shown[-1].time_s == pytest.approx(played.result.time_s)
     # What is in a frame is its own.

@@ -12,8 +12,9 @@ from gymnasium.vector import AutoresetMode
 from roller_env.envs.single import RollerEnv
 from roller_env.envs.vector import RollerVectorEnv
 from roller_env.game.actions import ActionMode, forces
-from roller_env.game.rules import INTRO_S
+from roller_env.game.step import INTRO_S
 from roller_env.level import shipped_levels
+from roller_env.pieces.coin import COIN
 from roller_env.replay import Recorder, ReplayError, replays_of, verify
 from tests.builders import make_level
 from tests.replay.recording import pushed_otherwise, same, straight_on, wandered
@@ -221,7 +222,7 @@ def test_a_recording_begins_at_a_beginning() -> None:
 def test_a_game_that_was_put_elsewhere_is_no_game_of_the_level() -> None:
     simulation = simulation_of("flat", num_envs=2, physics="fast")
     snapshot = simulation.snapshot()
-    snapshot.game["coin_taken"][1, 0] = True
+    snapshot.game.of(COIN).taken[1, 0] = True
     simulation.restore(snapshot)
     with pytest.raises(ValueError, match=r"found \[1\] begun with a moving ball or without coins"):
         Recorder(simulation).begin([0, 1])

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from roller_env.pieces.coin import COIN
 from roller_env.play.replay_page import ReplaySession
 from roller_env.play.session import Phase
 from roller_env.replay import Playback
@@ -31,9 +32,9 @@ def test_between_two_steps_lies_what_is_between_their_states(
     before, after = playback.frame(step), playback.frame(step + 1)
     assert np.array_equal(frame.before, before.qpos)
     assert np.array_equal(frame.after, after.qpos)
-    assert np.array_equal(frame.state.coin_taken, after.state.coin_taken)
+    assert np.array_equal(frame.state.of(COIN).taken, after.state.of(COIN).taken)
     assert frame.fraction == pytest.approx(0.25)
-    assert frame.result.coins == after.state.points[0]
+    assert frame.result.coins == after.state.coins[0]
 
 
 def test_time_passes_while_it_plays_and_ends_at_the_end(session: ReplaySession) -> None:

@@ -106,7 +106,7 @@ def test_each_row_can_be_given_options_of_its_own() -> None:
     env, plain = RollerVecEnv("flat", 2, seed=0), RollerVecEnv("flat", 2, seed=0)
     env.set_options([{"intro": True, "coins": [0]}, {"position": (1.0, 0.5, 0.5)}])
     observation, usual = env.reset(), plain.reset()
-    count = env.simulation.table.coin_count[0]
+    count = env.simulation.coins_in_level[0]
     assert [info["coins"] for info in env.reset_infos] == [count - 1, 0]
     assert env.simulation.state.control_delay_s.tolist() == [6.0, 0.0]
     assert env.simulation.ball_position[1].tolist() == [1.0, 0.5, 0.5]

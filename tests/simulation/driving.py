@@ -49,11 +49,11 @@ def along_the_route(simulation: Simulation) -> Float64:
 
     The simulation must have the ``shaped`` reward, which is what keeps count of the waypoints.
     """
-    rows = np.arange(simulation.num_envs)
-    waypoint = simulation.table.route[rows, simulation.state.waypoint]
-    away = (waypoint - simulation.ball_position)[:, :2]
+    points = simulation.table.routes.points[0]
+    away = (points[simulation.state.shaping.waypoint] - simulation.ball_position)[:, :2]
     velocity = simulation.observe()[:, _VELOCITY][:, :2]
-    return KEY_FORCE_N * np.clip(away - velocity, -1.0, 1.0)
+    push: Float64 = KEY_FORCE_N * np.clip(away - velocity, -1.0, 1.0)
+    return push
 
 
 def plain_data(model: mujoco.MjModel, state: Float64) -> mujoco.MjData:
@@ -78,6 +78,6 @@ def bits(simulation: Simulation) -> list[bytes]:
 
 def bits_of_row(snapshot: Snapshot, row: int) -> bytes:
     """Return all that the future of one of a snapshot's rows depends on."""
-    game = b"".join(values[row].tobytes() for values in snapshot.game.values())
+    game = b"".join(values[row].tobytes() for values in snapshot.game.arrays())
     physics: bytes = snapshot.physics[row].tobytes()
     return physics + game + repr(snapshot.generators[row]).encode()

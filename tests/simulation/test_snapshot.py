@@ -8,19 +8,28 @@ import pytest
 
 from roller_env.game import cameras
 from roller_env.game.state import GameState
+from roller_env.pieces.camera_trigger import CAMERA_TRIGGER
+from roller_env.pieces.lift_pad import LIFT_PAD
+from roller_env.pieces.plate import PLATE
 from roller_env.simulation import Simulation
 from tests.simulation.driving import along_the_route, bits, simulation_of, wandering
 
 Moment = Callable[[GameState], bool]
 
 MOMENTS: dict[str, tuple[str, Moment]] = {
-    "while_the_plate_sinks": ("gate", lambda s: bool((s.plate_struck & ~s.plate_down).any())),
-    "while_the_gate_opens": ("gate", lambda s: bool(s.gate_opening.any())),
-    "while_the_lift_pushes": ("lift", lambda s: bool((s.thrust_s > 2.0).any())),
-    "while_the_camera_waits": ("classic", lambda s: bool(np.isfinite(s.camera_delay_s).any())),
+    "while_the_plate_sinks": (
+        "gate",
+        lambda s: bool((s.of(PLATE).struck > s.of(PLATE).down).any()),
+    ),
+    "while_the_gate_opens": ("gate", lambda s: bool(s.signals.any())),
+    "while_the_lift_pushes": ("lift", lambda s: bool((s.of(LIFT_PAD).thrust_s > 2.0).any())),
+    "while_the_camera_waits": (
+        "classic",
+        lambda s: bool(np.isfinite(s.of(CAMERA_TRIGGER).delay_s).any()),
+    ),
     "while_the_camera_retreats": (
         "classic",
-        lambda s: bool((s.camera_mode == cameras.MODE_RETREAT).any()),
+        lambda s: bool((s.camera.mode == cameras.MODE_RETREAT).any()),
     ),
     "in_the_middle_of_the_bridges": ("bridge", lambda s: bool(s.steps[0] == 90)),
 }

@@ -11,6 +11,7 @@ import pytest
 
 from roller_env.game.observations import STATE_ENTRIES, split
 from roller_env.game.rewards import RewardWeights
+from roller_env.pieces.plate import PLATE
 from roller_env.simulation import Simulation, Transition
 from tests.builders import coin, make_level, resting
 from tests.simulation.driving import along_the_route, force_on_ball, simulation_of, wandering
@@ -93,7 +94,7 @@ def test_a_pad_pushes_from_the_step_after_the_one_in_which_it_was_entered() -> N
 def test_a_plate_sinks_from_the_step_after_the_one_in_which_it_was_struck() -> None:
     simulation = simulation_of("gate", reward="shaped")
     plate = simulation.compiled.plate_qpos
-    while not simulation.state.plate_struck.any():
+    while not simulation.state.of(PLATE).struck.any():
         simulation.step(along_the_route(simulation))
     assert observed(simulation, "plate_sinking")[0] == 1.0
     assert observed(simulation, "plate_present")[0] == 0.0

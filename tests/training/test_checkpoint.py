@@ -103,8 +103,8 @@ def test_games_and_counters_come_back_where_they_were(
     was, now = games(model), games(again)
     assert np.array_equal(was.physics, now.physics)
     assert was.generators == now.generators
-    for name, values in was.game.items():
-        assert np.array_equal(values, now.game[name]), name
+    for name, values in was.game.named().items():
+        assert np.array_equal(values, now.game.named()[name]), name
 
 
 def test_random_generators_come_back_where_they_were(
