@@ -16,7 +16,7 @@ from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.config import MAX_ENVS, EnvConfig
 from roller_env.divergence import report
 from roller_env.game import observations, step
-from roller_env.game.bodies import Bodies, Controls
+from roller_env.game.bodies import Bodies, Columns
 from roller_env.game.state import GameState, score_percent
 from roller_env.game.step import Games, Rewarding
 from roller_env.game.tables import LevelTable
@@ -154,7 +154,8 @@ class Simulation:
         self._games = Games(self.table, level_of, self._episode_lengths(level_of))
         self.state = self._games.state
         self._stepper = Stepper(self.compiled.model, num_envs, config.substeps, config.num_threads)
-        self._bodies, self._controls = self._views()
+        self._at = self._columns()
+        self._bodies = Bodies.of(self._stepper.state, self._at)
         self._rewarding = Rewarding(
             np.array(config.reward_weights.terms), config.reward == "shaped", config.discount
         )
@@ -162,22 +163,27 @@ class Simulation:
         self._ray_directions = observations.ray_directions()
         self._scan_offsets = observations.scan_offsets()
 
-    def _views(self) -> tuple[Bodies, Controls]:
-        """Return what the rules know of the physics, as views of its arrays.
+    def _columns(self) -> Columns:
+        """Return where the rules find things in MuJoCo's integration state.
 
         MuJoCo numbers joints and actuators in the order in which the level's spec adds them: the
         ball's, then those of the plates and of the gates.
         """
-        physics, ball, motion = self._stepper, self.compiled.ball_qpos, self.compiled.ball_qvel
-        bodies = Bodies(
-            position=physics.qpos[:, ball : ball + 3],
-            orientation=physics.qpos[:, ball + 3 : ball + 7],
-            velocity=physics.qvel[:, motion : motion + 3],
-            angular_velocity=physics.qvel[:, motion + 3 : motion + 6],
-            displacement=physics.qpos[:, ball + 7 :],
-            aim=physics.act[:, :],
+        first, compiled = self._stepper.first_columns, self.compiled
+        position = first["qpos"] + compiled.ball_qpos
+        velocity = first["qvel"] + compiled.ball_qvel
+        return Columns(
+            position=position,
+            orientation=position + 3,
+            velocity=velocity,
+            angular_velocity=velocity + 3,
+            displacement=position + 7,
+            aim=first["act"],
+            force_n=first["ctrl"],
+            pull=first["ctrl"] + 3,
+            movers=self.table.movers.stop.shape[1],
+            path=compiled.ball_qpos,
         )
-        return bodies, Controls(force_n=physics.ctrl[:, :3], velocity=physics.ctrl[:, 3:])
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a copy is made of; it goes on with the same bits, and on its own.
@@ -414,23 +420,14 @@ class Simulation:
         every: Int64 | slice = slice(None) if rows is None else rows
         envs = self._every if rows is None else rows
         before = self._stepper.state[every].copy()
-        step.prepare(
-            self._games.preparing, envs, self.duration_s, force_n, self._bodies, self._controls
-        )
+        games, duration_s, physics = self._games, self.duration_s, self._stepper.state
+        step.prepare(games.preparing, envs, duration_s, force_n, physics, self._at)
         hanging = self._games.hanging_s[every]
         path = self._let_go(rows, hanging) if hanging.any() else self._stepper.advance(rows)
         diverged = self._stepper.diverged()[every] | ~np.isfinite(path[:, -1]).all(axis=1)
         if diverged.any():
             self._end_diverged(envs[diverged], path, diverged, before)
-        ball = self.compiled.ball_qpos
-        step.conclude(
-            self._games.concluding,
-            envs,
-            self.duration_s,
-            path[:, :, ball : ball + 3],
-            self._bodies.displacement,
-            self._rewarding,
-        )
+        step.conclude(games.concluding, envs, duration_s, path, physics, self._at, self._rewarding)
 
     def _let_go(self, rows: Int64 | None, hanging_s: Float64) -> Float64:
         """Advance rows of which some begin to move only after ``hanging_s``, (n,); return paths."""
@@ -450,7 +447,8 @@ class Simulation:
                 self.table.routes,
                 self._games.level_of,
                 rows,
-                self._bodies.position,
+                self._stepper.state,
+                self._at,
                 weight,
                 follows,
                 self.state.shaping,
@@ -490,7 +488,7 @@ class Simulation:
         envs = self._every if rows is None else np.asarray(rows)
         size = sum(entry.size for entry in observations.entries(self.config.observation))
         out = np.zeros((len(envs), size), dtype=np.float32)
-        step.observe(self._games.showing, envs, self._bodies, out)
+        step.observe(self._games.showing, envs, self._stepper.state, self._at, out)
         if self.config.observation == "rays":
             out[:, observations.STATE_SIZE :] = self._cast_rays(rows, envs)
         return out

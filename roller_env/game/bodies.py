@@ -1,4 +1,7 @@
-"""What the rules know of the physics: where everything is, and what the motors are told."""
+"""What the rules know of the physics: where everything is, and what the motors are told.
+
+All of it is columns of the physics' own state, one row an env.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +10,36 @@ from typing import NamedTuple
 from roller_env.arrays import Float64
 
 
-class Bodies(NamedTuple):
-    """Where the balls and slabs of N envs are; live.
+class Columns(NamedTuple):
+    """Where things begin in a row of the physics' state.
 
     Attributes:
-        position: (N, 3) ball centres, metres, world frame.
-        orientation: (N, 4) unit quaternions (w, x, y, z), ball to world.
-        velocity: (N, 3) m/s, world frame.
-        angular_velocity: (N, 3) rad/s, in each ball's own frame.
-        displacement: (N, M) how far the slabs are from where they began, metres, <= 0.
-        aim: (N, M) displacements to which they are being pulled, which they trail.
+        position: ball's centre, 3: metres, world frame.
+        orientation: 4: unit quaternion (w, x, y, z), ball to world.
+        velocity: 3: m/s, world frame.
+        angular_velocity: 3: rad/s, in the ball's own frame.
+        displacement: one a slab: how far it is from where it began, metres, <= 0.
+        aim: one a slab: displacement to which it is being pulled, which it trails.
+        force_n: 3, a control: mean force on the ball over the step, newtons, world frame.
+        pull: one a slab, a control: m/s at which its aim moves; below zero is down.
+        movers: number of slabs.
+        path: where the ball's centre begins in a row of the path that a step leaves.
     """
+
+    position: int
+    orientation: int
+    velocity: int
+    angular_velocity: int
+    displacement: int
+    aim: int
+    force_n: int
+    pull: int
+    movers: int
+    path: int
+
+
+class Bodies(NamedTuple):
+    """Views of the columns of N envs; see `Columns`."""
 
     position: Float64
     orientation: Float64
@@ -25,15 +47,23 @@ class Bodies(NamedTuple):
     angular_velocity: Float64
     displacement: Float64
     aim: Float64
-
-
-class Controls(NamedTuple):
-    """What the motors of N envs do in the next control step.
-
-    Attributes:
-        force_n: (N, 3) mean force on the ball over the step, newtons, world frame.
-        velocity: (N, M) m/s at which what pulls the slabs moves; below zero is down.
-    """
-
     force_n: Float64
-    velocity: Float64
+    pull: Float64
+
+    @staticmethod
+    def of(physics: Float64, at: Columns) -> Bodies:
+        """Return views of ``physics``, (N, width)."""
+
+        def columns(first: int, count: int) -> Float64:
+            return physics[:, first : first + count]
+
+        return Bodies(
+            position=columns(at.position, 3),
+            orientation=columns(at.orientation, 4),
+            velocity=columns(at.velocity, 3),
+            angular_velocity=columns(at.angular_velocity, 3),
+            displacement=columns(at.displacement, at.movers),
+            aim=columns(at.aim, at.movers),
+            force_n=columns(at.force_n, 3),
+            pull=columns(at.pull, at.movers),
+        )

@@ -14,7 +14,7 @@ import numpy as np
 
 from roller_env.arrays import Float64
 from roller_env.compiled import part
-from roller_env.game.bodies import Bodies
+from roller_env.game.bodies import Columns
 from roller_env.game.tables import Movers
 
 BRAKING_M_S2: Final = 5.0
@@ -30,10 +30,10 @@ GAP_M: Final = 0.001
 def lowering(
     duration_s: float,
     level: int,
-    env: int,
     mover: int,
     movers: Movers,
-    bodies: Bodies,
+    body: Float64,
+    at: Columns,
 ) -> float:
     """Return the velocity at which a slab that goes down is pulled in the next step, m/s.
 
@@ -41,7 +41,7 @@ def lowering(
     touched and not pressed.
     """
     half, centre = movers.half[level, mover], movers.centre[level, mover]
-    slab = bodies.displacement[env, mover]
+    slab = body[at.displacement + mover]
     down: float = movers.speed[level, mover]
     now, soon = _room_under(
         duration_s,
@@ -49,14 +49,14 @@ def lowering(
         half,
         movers.heading[level, mover],
         centre[2] + slab - half[2],
-        bodies.position[env],
-        bodies.velocity[env],
+        body[at.position : at.position + 3],
+        body[at.velocity : at.velocity + 3],
         movers.ball_radius[level],
     )
     if soon < np.inf:
         room = now if now < 0.0 else max(soon - GAP_M, 0.0)
         down = min(down, math.sqrt(2.0 * BRAKING_M_S2 * max(room, 0.0)))
-        left = room - (slab - bodies.aim[env, mover])
+        left = room - (slab - body[at.aim + mover])
         # Half of what is left in a step, so that the last ones are slow; an aim within the ball is
         # taken back at once.
         down = min(down, left / (2.0 * duration_s) if left > 0.0 else left / duration_s)

@@ -16,7 +16,7 @@ import numpy as np
 
 from roller_env.arrays import Bool, Float32, Float64, Int64
 from roller_env.compiled import compiled_with_packages, inlined
-from roller_env.game.bodies import Bodies, Controls
+from roller_env.game.bodies import Columns
 from roller_env.game.cameras import settle
 from roller_env.game.kinds import all_hooks
 from roller_env.game.observations import STATE_SIZE, rotated
@@ -243,8 +243,8 @@ def prepare(
     envs: Int64,
     duration_s: float,
     key_force_n: Float64,
-    bodies: Bodies,
-    controls: Controls,
+    physics: Float64,
+    at: Columns,
 ) -> None:
     """Write what the motors of some envs do in the next step, given the keys' force.
 
@@ -256,15 +256,16 @@ def prepare(
         envs: (n,) which of them.
         duration_s: of the step.
         key_force_n: (N, 2) newtons, world x and y.
-        bodies: where everything is.
-        controls: written.
+        physics: (N, width) the state of the physics; its controls are written.
+        at: where everything is in it.
     """
     for env in envs:
         level, delay_s = games.level_of[env], games.control_delay_s[env]
         # Both delays begin when the level is loaded.
         games.hanging_s[env] = max(delay_s - (INTRO_S - HANGING_S), 0.0)
         held = min(max(1.0 - delay_s / duration_s, 0.0), 1.0)
-        force_n, moving = controls.force_n[env], games.moving[env]
+        body, moving = physics[env], games.moving[env]
+        force_n = body[at.force_n : at.force_n + 3]
         force_n[0] = key_force_n[env, 0] * held
         force_n[1] = key_force_n[env, 1] * held
         force_n[2] = 0.0
@@ -275,8 +276,8 @@ def prepare(
         for mover in range(len(moving)):
             velocity = 0.0
             if moving[mover]:
-                velocity = lowering(duration_s, level, env, mover, games.movers, bodies)
-            controls.velocity[env, mover] = velocity
+                velocity = lowering(duration_s, level, mover, games.movers, body, at)
+            body[at.pull + mover] = velocity
 
 
 @kernel
@@ -285,7 +286,8 @@ def conclude(
     envs: Int64,
     duration_s: float,
     path: Float64,
-    displacement: Float64,
+    physics: Float64,
+    at: Columns,
     rewarding: Rewarding,
 ) -> None:
     """Draw the consequences of a step in some envs, and say what it was worth.
@@ -297,13 +299,15 @@ def conclude(
         games: all of them.
         envs: (n,) which of them.
         duration_s: of the step.
-        path: (n, S + 1, 3) their balls' centres before the first physics step and after each.
-        displacement: (N, M) where the slabs are now.
+        path: (n, S + 1, p) where they were before the first physics step and after each; their
+            balls' centres among it.
+        physics: (N, width) the state of the physics now.
+        at: where everything is in both.
         rewarding: what it is worth.
     """
     state, step = games.state, games.step
     for number in range(len(envs)):
-        env, way = envs[number], path[number]
+        env, way = envs[number], path[number, :, at.path : at.path + 3]
         level = games.level_of[env]
         _find_events(games, level, env, duration_s, way)
         state.steps[env] += 1
@@ -320,7 +324,7 @@ def conclude(
             step.end[env],
             step.entry[env],
             step.inside[env],
-            displacement[env],
+            physics[env, at.displacement : at.displacement + at.movers],
             step.coins[env],
             state.signals[env],
             step.camera,
@@ -414,7 +418,8 @@ def follow_route(
     routes: Routes,
     level_of: Int64,
     envs: Int64,
-    position: Float64,
+    physics: Float64,
+    at: Columns,
     weight: float,
     follows: Bool,
     state: ShapingState,
@@ -425,33 +430,37 @@ def follow_route(
         routes: of the levels.
         level_of: (N,) each env's level.
         envs: (n,) which of them.
-        position: (N, 3) balls' centres, metres, world frame.
+        physics: (N, width) the state of the physics.
+        at: where everything is in it.
         weight: potential of a completed route.
         follows: (n,) whether what lies up to there counts as passed.
         state: written.
     """
     for number in range(len(envs)):
         env = envs[number]
-        _measure(routes, level_of[env], env, position[env], weight, follows[number], state)
+        ball = physics[env, at.position : at.position + 3]
+        _measure(routes, level_of[env], env, ball, weight, follows[number], state)
 
 
 @kernel
-def observe(games: Showing, envs: Int64, bodies: Bodies, out: Float32) -> None:
+def observe(games: Showing, envs: Int64, physics: Float64, at: Columns, out: Float32) -> None:
     """Write the state vectors of some envs.
 
     Args:
         games: all of them.
         envs: (n,) which of them.
-        bodies: where everything is.
+        physics: (N, width) the state of the physics.
+        at: where everything is in it.
         out: (n, `STATE_SIZE` or more) laid out as `STATE_ENTRIES`; zeros.
     """
     for number in range(len(envs)):
         env, shown = envs[number], out[number]
-        level, ball = games.level_of[env], bodies.position[env]
-        turned = rotated(bodies.orientation[env], bodies.angular_velocity[env])
+        level, body = games.level_of[env], physics[env]
+        ball = body[at.position : at.position + 3]
+        turned = rotated(body[at.orientation :], body[at.angular_velocity :])
         for axis in range(3):
             shown[axis] = ball[axis]
-            shown[3 + axis] = bodies.velocity[env, axis]
+            shown[3 + axis] = body[at.velocity + axis]
             shown[6 + axis] = turned[axis]
         now = Seen(
             level,
@@ -461,7 +470,7 @@ def observe(games: Showing, envs: Int64, bodies: Bodies, out: Float32) -> None:
             games.regions.real[level],
             games.movers.centre[level],
             games.movers.stop[level],
-            bodies.displacement[env],
+            body[at.displacement : at.displacement + at.movers],
             games.work[env],
             shown,
         )

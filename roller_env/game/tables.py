@@ -94,18 +94,18 @@ class LevelTable(NamedTuple):
         ]
         return LevelTable(
             regions=Regions(
-                centre=region[..., :3],
-                half=region[..., 3:6],
-                radius=region[..., 6],
-                floor=region[..., 7],
+                centre=np.ascontiguousarray(region[..., :3]),
+                half=np.ascontiguousarray(region[..., 3:6]),
+                radius=np.ascontiguousarray(region[..., 6]),
+                floor=np.ascontiguousarray(region[..., 7]),
                 real=region[..., 0] < FAR_M,
             ),
             movers=Movers(
-                centre=mover[..., :3],
-                half=mover[..., 3:6],
-                heading=mover[..., 6:8],
-                stop=mover[..., 8],
-                speed=mover[..., 9],
+                centre=np.ascontiguousarray(mover[..., :3]),
+                half=np.ascontiguousarray(mover[..., 3:6]),
+                heading=np.ascontiguousarray(mover[..., 6:8]),
+                stop=np.ascontiguousarray(mover[..., 8]),
+                speed=np.ascontiguousarray(mover[..., 9]),
                 ball_radius=np.array([level.ball.radius for level in levels]),
             ),
             routes=Routes(

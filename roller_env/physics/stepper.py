@@ -28,6 +28,16 @@ def keeps_poses(model: mujoco.MjModel) -> bool:
     return bool(model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP)
 
 
+_PARTS: Final = ("qpos", "qvel", "act", "ctrl")
+
+
+def _first_column(model: mujoco.MjModel, name: str) -> int:
+    """Return where a part begins in MuJoCo's integration state, whose parts lie in their order."""
+    before = int(getattr(mujoco.mjtState, f"mjSTATE_{name.upper()}")) - 1
+    columns: int = mujoco.mj_stateSize(model, before & int(mujoco.mjtState.mjSTATE_INTEGRATION))
+    return columns
+
+
 class Stepper:
     """N copies of one model's state, bit-identical to a plain ``mj_step`` loop at any thread count.
 
@@ -40,6 +50,7 @@ class Stepper:
         qvel: (N, nv) float64, live view of the velocities.
         act: (N, na) float64, live view of the actuators' activations.
         ctrl: (N, nu) float64, live view of the controls; they hold during `advance`.
+        first_columns: where ``qpos``, ``qvel``, ``act`` and ``ctrl`` begin in a row of `state`.
         state: (N, nstate) float64, live view of MuJoCo's integration state: all of the above,
             activations, time and the solver's warm start. Copying a row back restores it exactly.
     """
@@ -66,6 +77,7 @@ class Stepper:
         self.act: Float64 = batch.bind("act") if model.na else np.empty((num_envs, 0))
         self.ctrl: Float64 = batch.bind("ctrl")
         self.state: Float64 = batch.state
+        self.first_columns = {name: _first_column(model, name) for name in _PARTS}
         self._recorded = np.empty((num_envs, substeps, model.nq))
         self._path = np.empty((num_envs, substeps + 1, model.nq))
         _STEPPERS.add(self)

@@ -316,20 +316,20 @@ def _snapshot(tree: Tree, own: Snapshot, rows: int) -> Snapshot:
         if isinstance(value, np.ndarray)
     }
     _check_arrays(_flat(tree), {**wanted, **like})
-    route = own.level.route
+    game, route = _flat(tree["game"]), own.level.route
     # The compiled rules look these up without asking whether they are there.
     for name, numbers, count in (
         ("level_of_row", tree["level_of_row"], 1),
-        ("camera/mode", tree["game"]["camera/mode"], len(MODES)),
-        ("waypoint", tree["game"]["shaping/waypoint"], 1 if route is None else len(route.points)),
+        ("camera/mode", game["camera/mode"], len(MODES)),
+        ("waypoint", game["shaping/waypoint"], 1 if route is None else len(route.points)),
     ):
         if ((numbers < 0) | (numbers >= count)).any():
             raise ValueError(f"{name}: found {numbers.tolist()}; must be 0 to {count - 1}")
     generators = tuple(tree["generators"])
     if len(generators) != rows:
         raise ValueError(f"generators: found {len(generators)}; wanted {rows}")
-    game = own.game.with_arrays(tree["game"])
-    return replace(own, **{**tree, "game": game, "generators": generators})
+    state = own.game.with_arrays(game)
+    return replace(own, **{**tree, "game": state, "generators": generators})
 
 
 def _random_state() -> Tree:

@@ -9,7 +9,7 @@ import numpy as np
 
 from roller_env.arrays import Bool, Float64, Int64
 from roller_env.game import step
-from roller_env.game.bodies import Bodies, Controls
+from roller_env.game.bodies import Bodies, Columns
 from roller_env.game.rewards import RewardWeights
 from roller_env.game.state import GameState
 from roller_env.game.step import Games, Rewarding
@@ -61,35 +61,30 @@ class Rails:
         self.step_s = step_s
         self.time_s = 0.0
         movers = self.table.movers.stop.shape[1]
-        slabs = np.zeros((count, movers))
         # On rails the slabs trail nothing.
-        self.bodies = Bodies(
-            position=self.table.start.copy(),
-            orientation=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-            velocity=np.zeros((count, 3)),
-            angular_velocity=np.zeros((count, 3)),
-            displacement=slabs,
-            aim=slabs,
-        )
-        self.controls = Controls(np.zeros((count, 3)), np.zeros((count, movers)))
+        self.at = Columns(0, 3, 7, 10, 13, 13, 13 + movers, 16 + movers, movers, path=0)
+        self.physics = np.zeros((count, 16 + 2 * movers))
+        self.bodies = Bodies.of(self.physics, self.at)
+        self.bodies.position[:] = self.table.start
+        self.bodies.orientation[:, 0] = 1.0
         self._rewarding = Rewarding(np.array((weights or RewardWeights()).terms), shaped, 1.0)
         self._every = np.arange(count)
 
-    def prepare(self) -> Controls:
-        """Return what the motors do in the next step, without keys."""
+    def prepare(self) -> None:
+        """Let the motors be told what to do in the next step, without keys."""
         keys = np.zeros((len(self._every), 2))
         games = self.games.preparing
-        step.prepare(games, self._every, self.step_s, keys, self.bodies, self.controls)
-        return self.controls
+        step.prepare(games, self._every, self.step_s, keys, self.physics, self.at)
 
     def follow(self, path: Float64) -> Events:
         """Let one control step pass on a path, (N, S + 1, 3) metres; struck plates sink."""
         slabs, before = self.bodies.displacement, self.state.of(COIN).taken.copy()
-        slabs += self.prepare().velocity * self.step_s
+        self.prepare()
+        slabs += self.bodies.pull * self.step_s
         np.maximum(slabs, self.table.movers.stop, out=slabs)
         games = self.games.concluding
         path = np.ascontiguousarray(path, dtype=np.float64)
-        step.conclude(games, self._every, self.step_s, path, slabs, self._rewarding)
+        step.conclude(games, self._every, self.step_s, path, self.physics, self.at, self._rewarding)
         self.bodies.position[:] = path[:, -1]
         self.time_s += self.step_s
         found = self.games.step

@@ -122,9 +122,11 @@ def test_what_begins_in_a_step_acts_from_the_next() -> None:
     """The task of a step is the one that it began with."""
     pad = {"at": (2.0, 0.0, 100.0), "size": (1.0, 1.0, 1.0)}
     rails = Rails(sky_level(lift_pads=[pad]))
-    assert rails.prepare().force_n[0, 2] == 0.0
+    rails.prepare()
+    assert rails.bodies.force_n[0, 2] == 0.0
     rails.go((2.0, 0.0, 100.0))
-    assert rails.prepare().force_n[0, 2] == pytest.approx(12.7)
+    rails.prepare()
+    assert rails.bodies.force_n[0, 2] == pytest.approx(12.7)
 
 
 # Side by side -------------------------------------------------------------------------------------
@@ -205,7 +207,7 @@ def test_an_env_plays_the_level_that_it_is_said_to_play() -> None:
     games = Games(LevelTable.of_levels([near, far]), np.array([1, 0, 1]), np.full(3, 100))
     rails = Rails(near, near, near)
     out = np.zeros((3, STATE_SIZE), dtype=np.float32)
-    observe(games.showing, np.arange(3), rails.bodies, out)
+    observe(games.showing, np.arange(3), rails.physics, rails.at, out)
     finish = split(out, STATE_ENTRIES)["finish"]
     np.testing.assert_array_equal(finish[:, 0], [50.5, 10.5, 50.5])
 
