@@ -79,6 +79,11 @@ def inlined(function: Callable[_P, _R]) -> Callable[_P, _R]:
     return cast("Callable[_P, _R]", _jit(function, nogil=True, _nrt=False, forceinline=True))
 
 
+def spliced(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Return ``function``, whose text becomes its callers' before anything is compiled."""
+    return cast("Callable[_P, _R]", _jit(function, nogil=True, _nrt=False, inline="always"))
+
+
 def _dispatcher(function: Callable[..., Any], **options: bool) -> Any:
     try:
         return _jit(function, cache=True, **options)

@@ -9,7 +9,7 @@ from numba import config
 from numba.extending import overload
 
 from roller_env.arrays import Int64
-from roller_env.compiled import inlined
+from roller_env.compiled import inlined, spliced
 from roller_env.level.schema import PIECE_KINDS
 from roller_env.pieces.rules import Hook, Own, Rules, nothing
 
@@ -36,7 +36,7 @@ def all_hooks(name: str) -> AllHooks:
         compiled = _chain(hooks)
 
         # Not strict: of annotated arguments it would find other names.
-        @overload(call, strict=False)
+        @overload(call, strict=False, inline="always")
         def _(now: Any, tables: Any, states: Any, owns: Any) -> AllHooks:
             return lambda now, tables, states, owns: compiled(now, tables, states, owns)  # noqa: PLW0108
 
@@ -44,21 +44,31 @@ def all_hooks(name: str) -> AllHooks:
 
 
 def _chain(hooks: list[Hook]) -> AllHooks:
-    """Return a compiled function that calls the hooks in turn, each with what is its kind's."""
-    chain: AllHooks = inlined(lambda now, tables, states, owns: None)
+    """Return a function, to be compiled, that calls the hooks in turn, each with its kind's own."""
+    chain: AllHooks | None = None
     for number in reversed(range(len(hooks))):
         if hooks[number] is not nothing:
-            chain = _before(chain, inlined(hooks[number]), number)
+            only = _only(inlined(hooks[number]), number)
+            chain = only if chain is None else _both(only, chain)
+    assert chain is not None, "every hook has a kind that has to do with it"
     return chain
 
 
-def _before(others: AllHooks, hook: Hook, number: int) -> AllHooks:
-    @inlined
-    def both(now: Any, tables: tuple[Any, ...], states: tuple[Any, ...], owns: Int64) -> None:
+def _only(hook: Hook, number: int) -> AllHooks:
+    @spliced
+    def call(now: Any, tables: tuple[Any, ...], states: tuple[Any, ...], owns: Int64) -> None:
         own = Own(
             owns[number, 0], owns[number, 1], owns[number, 2], owns[number, 3], owns[number, 4]
         )
         hook(now, tables[number], states[number], own)
+
+    return call
+
+
+def _both(first: AllHooks, others: AllHooks) -> AllHooks:
+    @spliced
+    def call(now: Any, tables: tuple[Any, ...], states: tuple[Any, ...], owns: Int64) -> None:
+        first(now, tables, states, owns)
         others(now, tables, states, owns)
 
-    return both
+    return call
