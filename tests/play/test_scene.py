@@ -104,18 +104,18 @@ def test_a_coin_turns_by_the_clock(hall: Shown) -> None:
     ("kind", "name", "arrays", "state"),
     [
         ("plate", part("plate") + "plate", {}, "idle"),
-        ("plate", part("plate") + "plate", {"plate_struck": True}, "active"),
-        ("plate", part("plate") + "plate", {"plate_struck": True, "plate_down": True}, "done"),
+        ("plate", part("plate") + "plate", {"plate/struck": True}, "active"),
+        ("plate", part("plate") + "plate", {"plate/struck": True, "plate/down": True}, "done"),
         ("gate", part("gate", 0) + "gate", {}, "idle"),
-        ("gate", part("gate", 0) + "gate", {"gate_opening": True}, "active"),
+        ("gate", part("gate", 0) + "gate", {"signals": True}, "active"),
         ("pad", part("pad", 0), {}, "idle"),
-        ("pad", part("pad", 0), {"thrust_s": 1.0}, "active"),
+        ("pad", part("pad", 0), {"lift_pad/thrust_s": 1.0}, "active"),
     ],
 )
 def test_exactly_the_puppet_of_the_state_is_seen(
     hall: Shown, kind: str, name: str, arrays: dict[str, object], state: str
 ) -> None:
-    change_state(hall.simulation, {})
+    change_state(hall.simulation, arrays)
     hall.show()
     states = ("idle", "active") if kind == "pad" else ("idle", "active", "done")
     seen = [other for other in states if hall.is_seen(f"{name} {kind}/{other}")]

@@ -178,7 +178,7 @@ Edit = Callable[[dict[str, Any], dict[str, npt.NDArray[Any]]], object]
         ),
         (
             lambda facts, arrays: arrays.update(
-                {"environments/games/game/waypoint": np.full(8, 10**9)}
+                {"environments/games/game/shaping/waypoint": np.full(8, 10**9)}
             ),
             "waypoint: found .*; must be 0 to ",
         ),
