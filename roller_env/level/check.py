@@ -15,7 +15,7 @@ import numpy as np
 
 from roller_env.level.expand import expand
 from roller_env.level.schema import BUILT_IN_MATERIALS, MAX_PIECES, Level
-from roller_env.level.space import burying, inside, is_static, starts
+from roller_env.level.space import burying, inside, starts
 from roller_env.level.words import InUnit, Unit, coin_groups
 from roller_env.pieces.coin import MAX_COINS, Coins
 from roller_env.pieces.gate import Gate
@@ -57,7 +57,7 @@ def check_level(level: Level, unit: Unit = "metre") -> list[Problem]:
         *problems,
         *_tubes(level, everything),
         *_start(level, everything, in_unit),
-        *_finish(level, everything),
+        *_finish(level),
         *_coins(level, in_unit),
     ]
 
@@ -243,9 +243,9 @@ def _start(level: Level, everything: Sequence[Solid], in_unit: InUnit) -> Iterat
         yield Problem(("start", "at"), message)
 
 
-def _finish(level: Level, everything: Sequence[Solid]) -> Iterator[Problem]:
-    static = [solid for solid in everything if is_static(solid)]
-    around = burying(static, level.finish.at, level.finish.size, level.ball.radius)
+def _finish(level: Level) -> Iterator[Problem]:
+    solids = expand(level).solids
+    around = burying(solids, level.finish.at, level.finish.size, level.ball.radius)
     if around:
         message = f"the finish is wholly inside {', '.join(around)}, where no ball can reach it"
         yield Problem(("finish", "at"), message)

@@ -8,7 +8,7 @@ import numpy as np
 
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
-from roller_env.level.space import burying, held_up, inside, is_static, starts
+from roller_env.level.space import burying, held_up, inside, starts
 from roller_env.level.words import InUnit, Unit, coin_groups
 from roller_env.pieces.piece import TOUCHING_M, Solid
 from roller_env.problems import Problem
@@ -31,7 +31,7 @@ def level_warnings(level: Level, unit: Unit = "metre") -> list[Problem]:
     return [
         *_start(level, everything, in_unit),
         *_coins(level, everything, in_unit),
-        *_plates(level, everything),
+        *_plates(level),
     ]
 
 
@@ -61,10 +61,10 @@ def _coins(level: Level, everything: Sequence[Solid], in_unit: InUnit) -> Iterat
         yield Problem(path, f"{text} inside {around[first]}; wanted in free space")
 
 
-def _plates(level: Level, everything: Sequence[Solid]) -> Iterator[Problem]:
-    static = [solid for solid in everything if is_static(solid)]
+def _plates(level: Level) -> Iterator[Problem]:
+    solids = expand(level).solids
     for index, plate in enumerate(level.plates):
-        around = burying(static, plate.at, plate.size, level.ball.radius)
+        around = burying(solids, plate.at, plate.size, level.ball.radius)
         if around:
             message = f"the plate is wholly inside {', '.join(around)}, where nothing can strike it"
             yield Problem(("plates", index, "at"), message)

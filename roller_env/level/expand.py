@@ -29,6 +29,7 @@ class ExpandedLevel:
     Attributes:
         solids: what stands still.
         movers: what is solid and moves, where it is at the start.
+        mover_kinds: the kind of piece that each of them is.
         coins: (K, 3) float64 centres, metres.
         coin_sources: the piece that each coin comes from, as a path such as ``coins[0]``.
         regions: where pieces act on the ball, by kind of piece.
@@ -36,6 +37,7 @@ class ExpandedLevel:
 
     solids: tuple[Solid, ...]
     movers: tuple[Mover, ...]
+    mover_kinds: tuple[type[Piece], ...]
     coins: Float64
     coin_sources: tuple[str, ...]
     regions: dict[type[Piece], tuple[Region, ...]]
@@ -44,6 +46,15 @@ class ExpandedLevel:
     def ground(self) -> tuple[Solid, ...]:
         """What stands still and does nothing."""
         return tuple(solid for solid in self.solids if solid.material)
+
+    @property
+    def machines(self) -> tuple[Solid, ...]:
+        """What stands still and does something: what has no material of its own."""
+        return tuple(solid for solid in self.solids if not solid.material)
+
+    def movers_of(self, kind: type[Piece]) -> list[Mover]:
+        """Return what moves of one kind of piece, in their order."""
+        return [m for m, own in zip(self.movers, self.mover_kinds, strict=True) if own is kind]
 
     @property
     def at_the_start(self) -> tuple[Solid, ...]:
@@ -68,6 +79,7 @@ def _expand(level: Level) -> ExpandedLevel:
     touch = level.ball.radius + TOUCH_TOLERANCE_M
     solids: list[Solid] = []
     movers: list[Mover] = []
+    mover_kinds: list[type[Piece]] = []
     coins: list[Float64] = [np.zeros((0, 3))]
     coin_sources: list[str] = []
     regions: dict[type[Piece], list[Region]] = defaultdict(list)
@@ -76,6 +88,7 @@ def _expand(level: Level) -> ExpandedLevel:
         mover, region, own = piece.mover(source), piece.region(touch), piece.coins()
         if mover is not None:
             movers.append(mover)
+            mover_kinds.append(type(piece))
         if region is not None:
             regions[type(piece)].append(region)
         coins.append(own)
@@ -83,6 +96,7 @@ def _expand(level: Level) -> ExpandedLevel:
     return ExpandedLevel(
         solids=tuple(solids),
         movers=tuple(movers),
+        mover_kinds=tuple(mover_kinds),
         coins=np.concatenate(coins).astype(np.float64),
         coin_sources=tuple(coin_sources),
         regions={kind: tuple(found) for kind, found in regions.items()},

@@ -16,9 +16,9 @@ import numpy as np
 from roller_env.level.expand import expand
 from roller_env.level.reach import Landing, Play, Reach, reach
 from roller_env.level.schema import Level
-from roller_env.level.space import is_static
 from roller_env.level.spans import EDGE, free_spans
 from roller_env.level.words import InUnit, Unit, coin_groups
+from roller_env.pieces.piece import path_of
 from roller_env.problems import Problem
 
 _DEEPER: Final = 1.1
@@ -38,7 +38,7 @@ def lint(level: Level, play: Play, unit: Unit = "metre") -> list[Problem]:
         The warnings, without places in a file.
     """
     in_unit = InUnit(unit)
-    if not any(is_static(solid) for solid in expand(level).at_the_start):
+    if not expand(level).solids:
         message = (
             "there is no floor, nothing solid that stands still; wanted floors, boxes or ramps"
         )
@@ -66,8 +66,7 @@ def _out_of_reach(level: Level, found: Reach, in_unit: InUnit) -> Iterator[Probl
 
 def _gates(level: Level, in_unit: InUnit) -> Iterator[Problem]:
     """Yield the gates that stand in the way of a ball on the ground also when they are open."""
-    static = [solid for solid in expand(level).at_the_start if is_static(solid)]
-    radius = level.ball.radius
+    static, radius = expand(level).solids, level.ball.radius
     for index, gate in enumerate(level.gates):
         wide = math.hypot(gate.size[0], gate.size[1]) / 2 + 2.0 * radius
         near = [solid for solid in static if _is_near(solid.centre, solid.half_size, gate.at, wide)]
@@ -110,9 +109,8 @@ def _thin(level: Level, play: Play, found: Reach, in_unit: InUnit) -> Iterator[P
         speed = math.sqrt(2.0 * level.gravity * max(landing.drop, 0.0))
         needed = 2.0 * (_depth(landing, speed, play) - radius)
         if landing.thickness < needed:
-            kind, _, number = source.removesuffix("]").partition("[")
             yield Problem(
-                (kind, int(number)),
+                path_of(source),
                 f"the ball can fall onto it from {in_unit.length(landing.drop)} up, comes in at "
                 f"{speed:.0f} m/s and may pass through its {in_unit.length(landing.thickness)} "
                 f"in a physics step of {1000.0 * play.dt_s:.3g} ms; wanted at least "

@@ -23,11 +23,6 @@ _RING_SHARE: Final = 0.9
 out, in radii."""
 
 
-def is_static(solid: Solid) -> bool:
-    """Say whether it stands still: whether it is no plate and no gate."""
-    return not solid.source.startswith(("plates", "gates"))
-
-
 def samples(half: float, step: float, most: int = MAX_SAMPLES) -> Float64:
     """Return an odd number of places from -half to half, ``step`` or less apart if ``most`` allow.
 

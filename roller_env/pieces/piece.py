@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.pieces.fields import Part
+from roller_env.problems import FieldPath
 
 Float64 = npt.NDArray[np.float64]
 Matrix = tuple[tuple[float, float, float], ...]
@@ -120,6 +121,12 @@ class Piece(Part):
             touch: distance of the ball's centre from a surface that it touches, metres.
         """
         return None
+
+
+def path_of(source: str) -> FieldPath:
+    """Return ``("floors", 0)`` for ``floors[0]``, and ``("finish",)`` for ``finish``."""
+    kind, _, number = source.removesuffix("]").partition("[")
+    return (kind, int(number)) if number else (kind,)
 
 
 def rotation_matrix(yaw_deg: float = 0.0, pitch_deg: float = 0.0) -> Matrix:
