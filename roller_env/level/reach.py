@@ -18,12 +18,12 @@ import numpy as np
 
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
-from roller_env.level.spans import EDGE, SLOPE, Bool, Indices, Spans, free_spans
 from roller_env.pieces.coin import COIN_REACH_M
 from roller_env.pieces.finish import Finish
 from roller_env.pieces.lift_pad import LiftPad, pad_groups
 from roller_env.pieces.piece import Float64, Region, Solid
 from roller_env.pieces.plate import Plate
+from roller_env.pieces.spans import EDGE, SLOPE, Bool, Indices, Spans, free_spans
 
 _CLIMB: Final = 0.9
 """How far, in radii, the ball's centre may rise from one column to the next while it rolls: that of
@@ -180,7 +180,7 @@ def _flood(level: Level, play: Play, coins: Float64, struck: Bool) -> _Found | N
 def _solids(level: Level, struck: Bool) -> list[Solid]:
     """Return what is solid, with the plates that were struck down and their gates open."""
     plates = [level.plates[index] for index in np.flatnonzero(struck)]
-    down = {name for plate in plates for name in (plate.name, *plate.opens)}
+    down = {name for plate in plates for name in (plate.name, *plate.sets_moving())}
     everything = expand(level)
     return [
         *everything.solids,

@@ -9,7 +9,7 @@ from pydantic import ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from roller_env.pieces.fields import Degrees, Part, PlanePoint, Point, PositiveLength
-from roller_env.pieces.piece import Float64, Piece
+from roller_env.pieces.piece import Count, Float64, Piece
 from roller_env.units import quants
 
 COIN_REACH_M: Final = quants(30.0)
@@ -75,6 +75,13 @@ class Coins(Piece):
                 {"given": ", ".join(given) or "none"},
             )
         return self
+
+    def count(self) -> Count:
+        """Return how many they are."""
+        if self.grid is not None:
+            return Count(0, self.grid.count[0] * self.grid.count[1])
+        row = self.line or self.arc
+        return Count(0, row.count if row is not None else 1)
 
     def coins(self) -> Float64:
         """Return them in their order."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from functools import cached_property
 from typing import Annotated, Final
@@ -11,7 +12,8 @@ from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from roller_env.pieces.fields import Name, NonNegativeLength, Part, Point, PositiveLength
-from roller_env.pieces.piece import UNTURNED, Float64, Piece, Solid
+from roller_env.pieces.piece import UNTURNED, Count, Float64, Piece, Solid
+from roller_env.problems import FieldPath
 from roller_env.units import quants
 
 MAX_PLAN_CELLS: Final = 40_000
@@ -100,6 +102,18 @@ class FloorPlan(Piece):
     def cells(self) -> dict[str, FloorCell]:
         """Every character that may stand in the plan, with its meaning (``.`` left out)."""
         return {"#": FloorCell(), "o": FloorCell(coin=True), **self.legend}
+
+    def count(self) -> Count:
+        """Return the number of its slabs and blocks, and of its coins."""
+        numbers = Counter("".join(self.rows).replace(".", ""))
+        cells = [(self.cells[character], number) for character, number in numbers.items()]
+        solids = sum(number * (2 if cell.wall > 0.0 else 1) for cell, number in cells)
+        return Count(solids, sum(number * cell.coin for cell, number in cells))
+
+    def materials(self) -> Iterator[tuple[FieldPath, str]]:
+        """Yield those of the legend."""
+        for character, cell in self.legend.items():
+            yield ("legend", character, "material"), cell.material
 
     def solids(self, source: str) -> Iterator[Solid]:
         """Yield a slab for each cell, and the block that stands on it."""

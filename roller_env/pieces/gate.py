@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
 from pydantic import Field
 
 from roller_env.pieces.fields import Degrees, Length, Name, Point, PositiveLength, Size
 from roller_env.pieces.piece import Mover, Piece, Solid, half_of, rotation_matrix
+from roller_env.pieces.spans import EDGE, free_spans
+from roller_env.problems import FieldPath, Problem, quoted
 from roller_env.units import quants
+
+if TYPE_CHECKING:
+    from roller_env.pieces.surroundings import Surroundings
 
 
 class Gate(Piece):
@@ -23,3 +33,42 @@ class Gate(Piece):
         """Return the gate."""
         solid = Solid(self.at, half_of(self.size), rotation_matrix(self.yaw_deg), "", source)
         return Mover(self.name, solid, self.lowers_to, self.speed)
+
+    def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield that nothing opens it, and why it cannot go down."""
+        if self.name not in around.set_moving:
+            message = f"no plate opens the gate {quoted(self.name)}; name it in a plate's 'opens'"
+            yield Problem((*path, "name"), message)
+        yield from around.rises(self, (*path, "lowers_to"), self.lowers_to, self.at[2])
+
+    def slow_doubts(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield that it stands in the way of a ball on the ground also when it is open."""
+        radius, half, length = around.ball_radius, self.size[2] / 2, around.in_unit.length
+        wide = math.hypot(self.size[0], self.size[1]) / 2 + 2.0 * radius
+        near = [
+            solid
+            for solid in around.solids
+            if math.dist(solid.centre[:2], self.at[:2]) <= wide + math.hypot(*solid.half_size)
+        ]
+        spans = free_spans(near, radius, np.array([self.at[:2]]))
+        if spans is None:
+            return
+        low, high = ([self.at[k] + sign * wide for k in (0, 1)] for sign in (-1, 1))
+        beside = spans.window(low, high)
+        beside = beside[spans.is_support[beside] & (spans.kind[beside] != EDGE)]
+        ground = spans.floor[beside] - radius
+        in_the_way = (ground < self.at[2] + half) & (ground + 2 * radius > self.at[2] - half)
+        if not in_the_way.any():
+            return
+        # The ground on which most of it stands out.
+        level_of_it = float(np.median(ground[in_the_way]))
+        left = self.lowers_to + half - level_of_it
+        if left < radius or self.lowers_to - half > level_of_it + 2 * radius:
+            return
+        found = "found" if "lowers_to" in self.model_fields_set else "not given, so it is found"
+        yield Problem(
+            (*path, "lowers_to"),
+            f"{found} {length(self.lowers_to)}, where the open gate still stands "
+            f"{length(left)} over the ground; wanted at most "
+            f"{length(level_of_it - half)}, which leaves the way free",
+        )

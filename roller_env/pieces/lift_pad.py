@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import Field
 
 from roller_env.pieces.fields import Name, Number, Point, Seconds, Size
 from roller_env.pieces.piece import TOUCHING_M, UNTURNED, Piece, Region, Solid, half_of
+from roller_env.problems import FieldPath, Problem
 from roller_env.units import quants
+
+if TYPE_CHECKING:
+    from roller_env.pieces.surroundings import Surroundings
 
 
 class LiftPad(Piece):
@@ -31,6 +35,13 @@ class LiftPad(Piece):
     def region(self, touch: float) -> Region:
         """Return where the ball touches it."""
         return Region(self.at, half_of(self.size), touch)
+
+    def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield that it is too weak for the ball."""
+        if self.force_n <= around.weight_n:
+            found = f"found {self.force_n:.6g} N, which never lifts the ball"
+            wanted = f"wanted more than its weight, {around.weight_n:.6g} N"
+            yield Problem((*path, "force_n"), f"{found}; {wanted}")
 
 
 def pad_groups(pads: Sequence[LiftPad]) -> list[int]:

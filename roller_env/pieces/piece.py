@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from roller_env.pieces.fields import Part
-from roller_env.problems import FieldPath
+from roller_env.problems import FieldPath, Problem
+
+if TYPE_CHECKING:
+    from roller_env.pieces.surroundings import Surroundings
 
 Float64 = npt.NDArray[np.float64]
 Matrix = tuple[tuple[float, float, float], ...]
@@ -92,11 +95,28 @@ class Region(NamedTuple):
     floor: float = -math.inf
 
 
+class Count(NamedTuple):
+    """What a piece stands for, in numbers."""
+
+    solids: int = 1
+    coins: int = 0
+
+
 class Piece(Part):
     """A kind of thing of which a level has any number, each in the field of its kind.
 
     What a kind does not have it leaves as it is here: nothing.
     """
+
+    def count(self) -> Count:
+        """Return how much it stands for, without making it."""
+        return Count()
+
+    def materials(self) -> Iterator[tuple[FieldPath, str]]:
+        """Yield the materials that it names, each with the field in which it does."""
+        name = getattr(self, "material", None)
+        if name is not None:
+            yield ("material",), name
 
     def solids(self, source: str) -> Iterator[Solid]:
         """Yield what of it is solid and stands still.
@@ -121,6 +141,27 @@ class Piece(Part):
             touch: distance of the ball's centre from a surface that it touches, metres.
         """
         return None
+
+    def sets_moving(self) -> tuple[str, ...]:
+        """Return the names of the pieces that begin to move when it has done so."""
+        return ()
+
+    def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield what is wrong with it, so that no level may have it.
+
+        Args:
+            path: its own, which those of its fields begin with.
+            around: the level around it.
+        """
+        yield from ()
+
+    def doubts(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield what it hardly can be meant to be, as `problems` does: shown at every loading."""
+        yield from ()
+
+    def slow_doubts(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield what only ``roller level check`` says, since it takes long to find."""
+        yield from ()
 
 
 def path_of(source: str) -> FieldPath:

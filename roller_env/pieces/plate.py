@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Final
 
 from pydantic import Field
 
 from roller_env.pieces.fields import Length, Name, Point, PositiveLength, Size
-from roller_env.pieces.piece import UNTURNED, Mover, Piece, Region, Solid, half_of
+from roller_env.pieces.gate import Gate
+from roller_env.pieces.piece import TOUCHING_M, UNTURNED, Mover, Piece, Region, Solid, half_of
+from roller_env.pieces.space import burying
+from roller_env.problems import FieldPath, Problem, listed, quoted
 from roller_env.units import quants
+
+if TYPE_CHECKING:
+    from roller_env.pieces.surroundings import Surroundings
 
 PLATE_HIT_HEIGHT_M: Final = quants(25.0)
 """A plate counts a hit only while the ball's centre is higher than this over its ``at``: the
@@ -37,3 +44,40 @@ class Plate(Piece):
     def region(self, touch: float) -> Region:
         """Return where the ball touches it from above."""
         return Region(self.at, half_of(self.size), touch, PLATE_HIT_HEIGHT_M)
+
+    def sets_moving(self) -> tuple[str, ...]:
+        """Return its gates."""
+        return self.opens
+
+    def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield gates that are not there, and why it cannot be struck or go down."""
+        yield from self._links(path, around.names.get(Gate, ()))
+        radius, length = around.ball_radius, around.in_unit.length
+        struck_at = radius + self.size[2] / 2
+        if struck_at < PLATE_HIT_HEIGHT_M + TOUCHING_M:
+            least = 2 * (PLATE_HIT_HEIGHT_M + TOUCHING_M - radius)
+            yield Problem(
+                (*path, "size", 2),
+                f"a ball on the plate is {length(struck_at)} over its centre, and only "
+                f"hits from more than {length(PLATE_HIT_HEIGHT_M)} count; "
+                f"wanted a plate at least {around.in_unit.rounded_up(least)} high",
+            )
+        yield from around.rises(self, (*path, "sinks_to"), self.sinks_to, self.at[2])
+
+    def _links(self, path: FieldPath, gates: tuple[str, ...]) -> Iterator[Problem]:
+        none = "the level has no gates that a plate could open"
+        if not self.opens:
+            message = f"the plate opens nothing; name at least one gate of {listed(gates)}"
+            yield Problem((*path, "opens"), message if gates else none)
+        for number, name in enumerate(self.opens):
+            if name not in gates:
+                message = f"no gate is called {quoted(name)}; there are {listed(gates)}"
+                where = (*path, "opens", number)
+                yield Problem(where, message if gates else none, written=name, known=gates)
+
+    def doubts(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield what wholly hides it."""
+        hiding = burying(around.solids, self.at, self.size, around.ball_radius)
+        if hiding:
+            message = f"the plate is wholly inside {', '.join(hiding)}, where nothing can strike it"
+            yield Problem((*path, "at"), message)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -19,8 +19,12 @@ from roller_env.pieces.fields import (
     Point,
     PositiveLength,
 )
-from roller_env.pieces.piece import Float64, Piece, Solid
+from roller_env.pieces.piece import Count, Float64, Piece, Solid
+from roller_env.problems import FieldPath, Problem
 from roller_env.units import quants
+
+if TYPE_CHECKING:
+    from roller_env.pieces.surroundings import Surroundings
 
 
 class Opening(Part):
@@ -71,6 +75,16 @@ class Tube(Piece):
         if upright and axis[2] < 0.0:
             quarter = -quarter
         return np.stack([zero, quarter, axis], axis=1)
+
+    def count(self) -> Count:
+        """Return the number of its panels, with those that its opening leaves out."""
+        return Count(self.sides)
+
+    def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield that there is nothing of it."""
+        if not any(self.solids("")):
+            message = "the opening leaves no panel of the tube; wanted a smaller one"
+            yield Problem((*path, "opening"), message)
 
     def solids(self, source: str) -> Iterator[Solid]:
         """Yield the panels that the opening leaves."""
