@@ -148,7 +148,7 @@ def _add_solid(spec: mujoco.MjSpec, solid: Solid, contact: dict[str, object], na
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=solid.half_size,
         pos=solid.centre,
-        quat=_quaternion(np.array(solid.rotation)),
+        quat=quaternion(np.array(solid.rotation)),
         **contact,
     )
 
@@ -168,7 +168,7 @@ def _add_mover(spec: mujoco.MjSpec, level: Level, mover: Mover, contact: dict[st
     body = spec.worldbody.add_body(
         name=name,
         pos=solid.centre,
-        quat=_quaternion(np.array(solid.rotation)),
+        quat=quaternion(np.array(solid.rotation)),
         gravcomp=1.0,
     )
     body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0.0, 0.0, 1.0])
@@ -192,7 +192,7 @@ def _add_mover(spec: mujoco.MjSpec, level: Level, mover: Mover, contact: dict[st
     servo.forcerange = [-most, most]
 
 
-def _quaternion(rotation: np.ndarray) -> np.ndarray:
+def quaternion(rotation: np.ndarray) -> np.ndarray:
     """Return the unit quaternion (w, x, y, z) of a rotation matrix (3, 3)."""
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, rotation.reshape(9))

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import weakref
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from roller_env.pieces.piece import Float64, Mover, Piece, Region, Solid
+from roller_env.pieces.coin import coin_shapes
+from roller_env.pieces.look import Shape
+from roller_env.pieces.piece import Float64, Mover, Piece, Region, Solid, number_of
 
 if TYPE_CHECKING:
     from roller_env.level.schema import Level
@@ -30,6 +33,7 @@ class ExpandedLevel:
         solids: what stands still.
         movers: what is solid and moves, where it is at the start.
         mover_kinds: the kind of piece that each of them is.
+        pipes: the sources of those that are no ground to see: of tubes.
         coins: (K, 3) float64 centres, metres.
         coin_sources: the piece that each coin comes from, as a path such as ``coins[0]``.
         regions: where pieces act on the ball, by kind of piece.
@@ -38,6 +42,7 @@ class ExpandedLevel:
     solids: tuple[Solid, ...]
     movers: tuple[Mover, ...]
     mover_kinds: tuple[type[Piece], ...]
+    pipes: frozenset[str]
     coins: Float64
     coin_sources: tuple[str, ...]
     regions: dict[type[Piece], tuple[Region, ...]]
@@ -97,7 +102,15 @@ def _expand(level: Level) -> ExpandedLevel:
         solids=tuple(solids),
         movers=tuple(movers),
         mover_kinds=tuple(mover_kinds),
+        pipes=frozenset(source for source, piece in level.pieces() if piece.is_pipe),
         coins=np.concatenate(coins).astype(np.float64),
         coin_sources=tuple(coin_sources),
         regions={kind: tuple(found) for kind, found in regions.items()},
     )
+
+
+def shapes(level: Level) -> Iterator[Shape]:
+    """Yield what is seen of a level besides its solids: of every piece, and the coins."""
+    for source, piece in level.pieces():
+        yield from piece.looks(number_of(source))
+    yield from coin_shapes(expand(level).coins)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Final
 
 import numpy as np
@@ -9,13 +10,26 @@ from pydantic import ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from roller_env.pieces.fields import Degrees, Part, PlanePoint, Point, PositiveLength
+from roller_env.pieces.look import Paint, Shape, Spin, part
 from roller_env.pieces.piece import Count, Float64, Piece
+from roller_env.pieces.surfaces import Surface, full_turn, lathe
 from roller_env.units import quants
 
 COIN_REACH_M: Final = quants(30.0)
 """A coin is collected when the ball's centre is this near to it (`collect`)."""
 
 MAX_COINS: Final = 10_000
+
+TURNS_PER_S: Final = 0.5
+BOB_M: Final = quants(2.0)
+BOBS_PER_S: Final = 0.6
+
+_RADIUS_M: Final = quants(11.0)
+_HALF_THICKNESS_M: Final = quants(2.0)
+_DETAILED: Final = 500
+"""More coins than this are plainer, or drawing would take seconds."""
+
+_GOLD: Final = (Paint("gold/", "#ffc928", emission=0.28, specular=0.9, shininess=0.6),)
 
 
 class CoinLine(Part):
@@ -106,3 +120,22 @@ class Coins(Piece):
         offsets = np.stack([xs, ys, np.zeros_like(xs)], -1).reshape(-1, 3)
         rows: Float64 = np.array(grid.centre) + offsets
         return rows
+
+
+def coin_shapes(positions: Float64) -> Iterator[Shape]:
+    """Yield all coins of a level, at ``positions``, (K, 3); each turns a little later."""
+    surface = _surface(24 if len(positions) <= _DETAILED else 8)
+    for number, (x, y, z) in enumerate(positions.tolist()):
+        spin = Spin(TURNS_PER_S, BOB_M, BOBS_PER_S, 0.15 * number)
+        name = part("coin", number)
+        yield Shape(name, surface, _GOLD, at=(x, y, z), motion=spin)
+
+
+def _surface(segments: int) -> Surface:
+    """Return a coin with a raised rim, standing upright, its axis along x."""
+    radius, rim, face = _RADIUS_M, _HALF_THICKNESS_M, 0.5 * _HALF_THICKNESS_M
+    half = [(radius, 0.0), (radius, 0.7 * rim), (0.94 * radius, rim), (0.76 * radius, rim)]
+    half += [(0.70 * radius, face), (0.0, face)]
+    profile = [(r, -h) for r, h in reversed(half)] + half[1:]
+    upright = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    return lathe(profile, full_turn(segments)).moved(upright, np.zeros(3))

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from pydantic import Field
 
 from roller_env.pieces.fields import Degrees, Length, Name, Point, PositiveLength, Size
-from roller_env.pieces.piece import Mover, Piece, Solid, half_of, rotation_matrix
+from roller_env.pieces.look import ACTIVE, DONE, IDLE, Shape, part, states
+from roller_env.pieces.piece import Mover, Piece, Solid, Vector, half_of, rotation_matrix
 from roller_env.pieces.spans import EDGE, free_spans
 from roller_env.problems import FieldPath, Problem, quoted
 from roller_env.units import quants
 
 if TYPE_CHECKING:
     from roller_env.pieces.surroundings import Surroundings
+
+_BARS: Final = 7
+_PAINT: Final = states("gate", ("#ff4d4d", 0.5), ("#ffb02e", 0.7), ("#35c46f", 0.3))
 
 
 class Gate(Piece):
@@ -33,6 +37,27 @@ class Gate(Piece):
         """Return the gate."""
         solid = Solid(self.at, half_of(self.size), rotation_matrix(self.yaw_deg), "", source)
         return Mover(self.name, solid, self.lowers_to, self.speed)
+
+    def looks(self, number: int) -> Iterator[Shape]:
+        """Yield bars across it whose colour tells its phase."""
+        x, y, z = half_of(self.size)
+        thickness, inset = quants(1.0), min(quants(1.0), 0.1 * max(x, y))
+        half = (x + thickness, y - inset) if x < y else (x - inset, y + thickness)
+        size = (*half, min(quants(3.0), z / (_BARS + 1)))
+        for bar in range(_BARS):
+            at = (0.0, 0.0, z * (1.0 - (2 * bar + 1) / (_BARS + 1)))
+            name = part("gate", bar) + self.name
+            yield Shape(name, "box", _PAINT, size, at, carrier=self.name)
+
+    def phase(self, state: Any, row: int, number: int, arrived: bool) -> int:
+        """Return whether it opens or is open."""
+        if not state.gate_opening[row, number]:
+            return IDLE
+        return DONE if arrived else ACTIVE
+
+    def label(self) -> tuple[str, Vector]:
+        """Return its name."""
+        return self.name, self.at
 
     def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
         """Yield that nothing opens it, and why it cannot go down."""

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 from pydantic import Field
 
 from roller_env.pieces.fields import Name, Number, Point, Seconds, Size
-from roller_env.pieces.piece import TOUCHING_M, UNTURNED, Piece, Region, Solid, half_of
+from roller_env.pieces.look import ACTIVE, IDLE, LIGHT, Shape, part, states
+from roller_env.pieces.piece import TOUCHING_M, UNTURNED, Piece, Region, Solid, Vector, half_of
 from roller_env.problems import FieldPath, Problem
 from roller_env.units import quants
 
 if TYPE_CHECKING:
     from roller_env.pieces.surroundings import Surroundings
+
+_PAINT: Final = states("pad", ("#27b5e8", 0.25), ("#8decff", 0.7))
 
 
 class LiftPad(Piece):
@@ -35,6 +38,24 @@ class LiftPad(Piece):
     def region(self, touch: float) -> Region:
         """Return where the ball touches it."""
         return Region(self.at, half_of(self.size), touch)
+
+    def looks(self, number: int) -> Iterator[Shape]:
+        """Yield a disc that lights up, and a column of light to rise in."""
+        x, y, z = self.at
+        radius, top = 0.42 * min(self.size[:2]), z + self.size[2] / 2
+        size, glow = (radius, quants(0.5), 0.0), (radius, quants(48.0), 0.0)
+        yield Shape(part("pad", number), "cylinder", _PAINT, size, (x, y, top))
+        at = (x, y, top + glow[1])
+        name = part("glow", number)
+        yield Shape(name, "cylinder", (LIGHT,), glow, at, seen_in=(ACTIVE,))
+
+    def phase(self, state: Any, row: int, number: int, arrived: bool) -> int:
+        """Return whether it pushes."""
+        return ACTIVE if state.thrust_s[row, number] > 0.0 else IDLE
+
+    def label(self) -> tuple[str, Vector]:
+        """Return what it does."""
+        return "lift", self.at
 
     def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
         """Yield that it is too weak for the ball."""

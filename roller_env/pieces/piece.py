@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from roller_env.pieces.fields import Part
 from roller_env.problems import FieldPath, Problem
 
 if TYPE_CHECKING:
+    from roller_env.pieces.look import Shape
     from roller_env.pieces.surroundings import Surroundings
 
 Float64 = npt.NDArray[np.float64]
@@ -106,7 +107,13 @@ class Piece(Part):
     """A kind of thing of which a level has any number, each in the field of its kind.
 
     What a kind does not have it leaves as it is here: nothing.
+
+    Attributes:
+        is_pipe: whether its solids are no ground: they have a look of their own, and a map may be
+            cut through them.
     """
+
+    is_pipe: ClassVar[bool] = False
 
     def count(self) -> Count:
         """Return how much it stands for, without making it."""
@@ -146,6 +153,29 @@ class Piece(Part):
         """Return the names of the pieces that begin to move when it has done so."""
         return ()
 
+    def looks(self, number: int) -> Iterator[Shape]:
+        """Yield what is seen of it besides its solids and coins.
+
+        Args:
+            number: its own among those of its kind.
+        """
+        yield from ()
+
+    def phase(self, state: Any, row: int, number: int, arrived: bool) -> int:
+        """Return what it is doing: IDLE, ACTIVE or DONE of `roller_env.pieces.look`.
+
+        Args:
+            state: the arrays of the games' state.
+            row: the game.
+            number: its own among those of its kind.
+            arrived: whether it moves and is where it stops.
+        """
+        return 0
+
+    def label(self) -> tuple[str, Vector] | None:
+        """Return what maps write beside it, and the place of it, metres."""
+        return None
+
     def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
         """Yield what is wrong with it, so that no level may have it.
 
@@ -168,6 +198,12 @@ def path_of(source: str) -> FieldPath:
     """Return ``("floors", 0)`` for ``floors[0]``, and ``("finish",)`` for ``finish``."""
     kind, _, number = source.removesuffix("]").partition("[")
     return (kind, int(number)) if number else (kind,)
+
+
+def number_of(source: str) -> int:
+    """Return the number of ``floors[0]`` among those of its kind; 0 for what there is one of."""
+    _, *number = path_of(source)
+    return int(number[0]) if number else 0
 
 
 def rotation_matrix(yaw_deg: float = 0.0, pitch_deg: float = 0.0) -> Matrix:

@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from pydantic import Field
 
 from roller_env.pieces.fields import Length, Name, Point, PositiveLength, Size
 from roller_env.pieces.gate import Gate
-from roller_env.pieces.piece import TOUCHING_M, UNTURNED, Mover, Piece, Region, Solid, half_of
+from roller_env.pieces.look import ACTIVE, DONE, IDLE, Shape, part, states
+from roller_env.pieces.piece import (
+    TOUCHING_M,
+    UNTURNED,
+    Mover,
+    Piece,
+    Region,
+    Solid,
+    Vector,
+    half_of,
+)
 from roller_env.pieces.space import burying
 from roller_env.problems import FieldPath, Problem, listed, quoted
 from roller_env.units import quants
@@ -20,6 +30,8 @@ if TYPE_CHECKING:
 PLATE_HIT_HEIGHT_M: Final = quants(25.0)
 """A plate counts a hit only while the ball's centre is higher than this over its ``at``: the
 original's guard against hits from the side."""
+
+_PAINT: Final = states("plate", ("#ffb02e", 0.25), ("#ff6a3d", 0.7), ("#35c46f", 0.3))
 
 
 class Plate(Piece):
@@ -44,6 +56,23 @@ class Plate(Piece):
     def region(self, touch: float) -> Region:
         """Return where the ball touches it from above."""
         return Region(self.at, half_of(self.size), touch, PLATE_HIT_HEIGHT_M)
+
+    def looks(self, number: int) -> Iterator[Shape]:
+        """Yield a cap whose colour tells its phase."""
+        x, y, z = half_of(self.size)
+        margin = min(quants(8.0), 0.2 * min(x, y))
+        size, at = (x - margin, y - margin, quants(0.5)), (0.0, 0.0, z)
+        yield Shape(part("plate") + self.name, "box", _PAINT, size, at, carrier=self.name)
+
+    def phase(self, state: Any, row: int, number: int, arrived: bool) -> int:
+        """Return whether it sinks or is down."""
+        if state.plate_down[row, number]:
+            return DONE
+        return ACTIVE if state.plate_struck[row, number] else IDLE
+
+    def label(self) -> tuple[str, Vector]:
+        """Return its name."""
+        return self.name, self.at
 
     def sets_moving(self) -> tuple[str, ...]:
         """Return its gates."""
