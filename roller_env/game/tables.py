@@ -19,8 +19,10 @@ import numpy.typing as npt
 from roller_env.game.cameras import TriggerKind
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
+from roller_env.pieces.gate import Gate
 from roller_env.pieces.lift_pad import pad_groups
-from roller_env.pieces.plate import PLATE_HIT_HEIGHT_M
+from roller_env.pieces.piece import Piece
+from roller_env.pieces.plate import PLATE_HIT_HEIGHT_M, Plate
 
 Float64 = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]
@@ -144,14 +146,14 @@ class LevelTable:
             coin_at=coin_at,
             coin_order=coin_order,
             coin_x=np.take_along_axis(coin_at[..., 0], coin_order, axis=1),
-            plate_stop=pad(lambda level: [p.sinks_to - p.at[2] for p in level.plates]),
+            plate_stop=pad(lambda level: _stops(level, Plate)),
             plate_speed=pad(lambda level: [p.speed for p in level.plates]),
             plate_opens=pad(lambda level: _opens(level, gates), (gates,)) > 0.0,
             plate_heading=pad(lambda level: [(1.0, 0.0) for _ in level.plates], (2,)),
             gate_centre=pad(lambda level: [g.at for g in level.gates], (3,)),
             gate_half=pad(lambda level: [np.array(g.size) / 2 for g in level.gates], (3,)),
             gate_heading=pad(lambda level: [_heading(g.yaw_deg) for g in level.gates], (2,)),
-            gate_stop=pad(lambda level: [g.lowers_to - g.at[2] for g in level.gates]),
+            gate_stop=pad(lambda level: _stops(level, Gate)),
             gate_speed=pad(lambda level: [g.speed for g in level.gates]),
             pad_force_n=pad(lambda level: [p.force_n for p in level.lift_pads]),
             pad_duration_s=pad(lambda level: [p.duration_s for p in level.lift_pads]),
@@ -215,6 +217,11 @@ def _regions(level: Level) -> dict[Kind, Float64]:
         Kind.FINISH: [row(level.finish.at, level.finish.size, touch)],
     }
     return {kind: np.array(values).reshape(-1, 8) for kind, values in rows.items()}
+
+
+def _stops(level: Level, kind: type[Piece]) -> list[float]:
+    movers = expand(level).movers_of(kind)
+    return [mover.stop - mover.solid.centre[2] for mover in movers]
 
 
 def _heading(yaw_deg: float) -> tuple[float, float]:

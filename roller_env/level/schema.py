@@ -11,8 +11,8 @@ test holds against the numbers here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Annotated, Final, Literal, get_args, get_origin
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Any, Final, Literal, get_args, get_origin
 
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
@@ -36,8 +36,9 @@ from roller_env.pieces.fields import (
 from roller_env.pieces.finish import Finish
 from roller_env.pieces.floor import FloorPlan
 from roller_env.pieces.gate import Gate
+from roller_env.pieces.ground import Ground
 from roller_env.pieces.lift_pad import LiftPad
-from roller_env.pieces.piece import Piece
+from roller_env.pieces.piece import Piece, Solid
 from roller_env.pieces.plate import Plate
 from roller_env.pieces.ramp import Ramp
 from roller_env.pieces.tube import Tube
@@ -149,6 +150,16 @@ class Level(Part):
             )
         return "metre"
 
+    @field_validator("*")
+    @classmethod
+    def _pieces_stand_on_the_ground(cls, value: Any, info: ValidationInfo) -> Any:
+        """Settle pieces on those of the fields before theirs."""
+        if not isinstance(value, tuple) or not value or not isinstance(value[0], Piece):
+            return value
+        below = [piece for field in PIECE_FIELDS for piece in info.data.get(field, ())]
+        ground = Ground(lambda: _solids(below))
+        return tuple(piece.settled(ground) for piece in value)
+
     def material(self, name: str) -> Material:
         """Return the material called ``name``, the level's own before the built-in one.
 
@@ -170,6 +181,13 @@ class Level(Part):
             for index, piece in enumerate(getattr(self, field)):
                 yield f"{field}[{index}]", piece
         yield "finish", self.finish
+
+
+def _solids(pieces: Iterable[Piece]) -> list[Solid]:
+    """Return what of pieces stands still; nothing of so many that the level will be refused."""
+    if sum(piece.count().solids for piece in pieces) > MAX_PIECES:  # they could take all memory
+        return []
+    return [solid for piece in pieces for solid in piece.solids("")]
 
 
 PIECE_FIELDS: Final = {

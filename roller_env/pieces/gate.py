@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from roller_env.pieces.fields import Degrees, Length, Name, Point, PositiveLength, Size
+from roller_env.pieces.ground import Ground, settled
 from roller_env.pieces.look import ACTIVE, DONE, IDLE, Shape, part, states
 from roller_env.pieces.piece import Mover, Piece, Solid, Vector, half_of, rotation_matrix
 from roller_env.pieces.spans import EDGE, free_spans
@@ -18,6 +19,9 @@ from roller_env.units import quants
 
 if TYPE_CHECKING:
     from roller_env.pieces.surroundings import Surroundings
+
+LOWERS_TO_M: Final = quants(-32.0)
+"""Where the original's gate stops: its upper face is then level with its deck's, at 80 quants."""
 
 _BARS: Final = 7
 _PAINT: Final = states("gate", ("#ff4d4d", 0.5), ("#ffb02e", 0.7), ("#35c46f", 0.3))
@@ -30,13 +34,25 @@ class Gate(Piece):
     at: Point = Field(description="Centre of the closed gate.")
     size: Size
     yaw_deg: Degrees = 0.0
-    lowers_to: Length = Field(quants(-32.0), description="Height of its centre when it is open.")
+    lowers_to: Length | None = Field(
+        None,
+        description="Height of its centre when it is open. If left out, its upper face is then "
+        "level with that of what it stands on; if it stands on nothing, -32 quants.",
+    )
     speed: PositiveLength = Field(quants(32.0), description="Length per second, downwards.")
 
+    def settled(self, ground: Ground) -> Gate:
+        """Return it with the height at which it is open."""
+        depth = self.size[2] / 2
+        return settled(self, "lowers_to", ground, self._solid(""), depth, LOWERS_TO_M)
+
     def mover(self, source: str) -> Mover:
-        """Return the gate."""
-        solid = Solid(self.at, half_of(self.size), rotation_matrix(self.yaw_deg), "", source)
-        return Mover(self.name, solid, self.lowers_to, self.speed)
+        """Return the gate, which a `Level` has settled."""
+        assert self.lowers_to is not None, "no level has settled it"
+        return Mover(self.name, self._solid(source), self.lowers_to, self.speed)
+
+    def _solid(self, source: str) -> Solid:
+        return Solid(self.at, half_of(self.size), rotation_matrix(self.yaw_deg), "", source)
 
     def looks(self, number: int) -> Iterator[Shape]:
         """Yield bars across it whose colour tells its phase."""
@@ -64,7 +80,7 @@ class Gate(Piece):
         if self.name not in around.set_moving:
             message = f"no plate opens the gate {quoted(self.name)}; name it in a plate's 'opens'"
             yield Problem((*path, "name"), message)
-        yield from around.rises(self, (*path, "lowers_to"), self.lowers_to, self.at[2])
+        yield from around.rises(self, (*path, "lowers_to"), self.mover(""))
 
     def slow_doubts(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
         """Yield that it stands in the way of a ball on the ground also when it is open."""
@@ -87,13 +103,14 @@ class Gate(Piece):
             return
         # The ground on which most of it stands out.
         level_of_it = float(np.median(ground[in_the_way]))
-        left = self.lowers_to + half - level_of_it
-        if left < radius or self.lowers_to - half > level_of_it + 2 * radius:
+        stop = self.mover("").stop
+        left = stop + half - level_of_it
+        if left < radius or stop - half > level_of_it + 2 * radius:
             return
         found = "found" if "lowers_to" in self.model_fields_set else "not given, so it is found"
         yield Problem(
             (*path, "lowers_to"),
-            f"{found} {length(self.lowers_to)}, where the open gate still stands "
+            f"{found} {length(stop)}, where the open gate still stands "
             f"{length(left)} over the ground; wanted at most "
             f"{length(level_of_it - half)}, which leaves the way free",
         )

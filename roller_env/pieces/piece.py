@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from roller_env.pieces.fields import Part
 from roller_env.problems import FieldPath, Problem
 
 if TYPE_CHECKING:
+    from roller_env.pieces.ground import Ground
     from roller_env.pieces.look import Shape
     from roller_env.pieces.surroundings import Surroundings
 
@@ -124,6 +125,10 @@ class Piece(Part):
         name = getattr(self, "material", None)
         if name is not None:
             yield ("material",), name
+
+    def settled(self, ground: Ground) -> Self:
+        """Return it with what follows from the ground where nobody has given it."""
+        return self
 
     def solids(self, source: str) -> Iterator[Solid]:
         """Yield what of it is solid and stands still.

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from roller_env.pieces.fields import Length, Name, Point, PositiveLength, Size
 from roller_env.pieces.gate import Gate
+from roller_env.pieces.ground import Ground, settled
 from roller_env.pieces.look import ACTIVE, DONE, IDLE, Shape, part, states
 from roller_env.pieces.piece import (
     TOUCHING_M,
@@ -31,6 +32,12 @@ PLATE_HIT_HEIGHT_M: Final = quants(25.0)
 """A plate counts a hit only while the ball's centre is higher than this over its ``at``: the
 original's guard against hits from the side."""
 
+SINKS_TO_M: Final = quants(67.0)
+"""Where the original's plate stops, whose deck has its upper face at 80 quants."""
+
+SUNK_M: Final = quants(80.0 - 67.0)
+"""How far under the face of what it stands on its centre is then."""
+
 _PAINT: Final = states("plate", ("#ffb02e", 0.25), ("#ff6a3d", 0.7), ("#35c46f", 0.3))
 
 
@@ -45,13 +52,24 @@ class Plate(Piece):
     at: Point = Field(description="Centre of the plate before it sinks.")
     size: Size
     opens: tuple[str, ...] = Field(description="Names of the gates it opens.")
-    sinks_to: Length = Field(quants(67.0), description="Height of its centre when it is down.")
+    sinks_to: Length | None = Field(
+        None,
+        description="Height of its centre when it is down. If left out, 13 quants under the upper "
+        "face of what it stands on, as in the original; if it stands on nothing, 67 quants.",
+    )
     speed: PositiveLength = Field(quants(1.6), description="Length per second, downwards.")
 
+    def settled(self, ground: Ground) -> Plate:
+        """Return it with the height at which it is down."""
+        return settled(self, "sinks_to", ground, self._solid(""), SUNK_M, SINKS_TO_M)
+
     def mover(self, source: str) -> Mover:
-        """Return the plate."""
-        solid = Solid(self.at, half_of(self.size), UNTURNED, "", source)
-        return Mover(self.name, solid, self.sinks_to, self.speed)
+        """Return the plate, which a `Level` has settled."""
+        assert self.sinks_to is not None, "no level has settled it"
+        return Mover(self.name, self._solid(source), self.sinks_to, self.speed)
+
+    def _solid(self, source: str) -> Solid:
+        return Solid(self.at, half_of(self.size), UNTURNED, "", source)
 
     def region(self, touch: float) -> Region:
         """Return where the ball touches it from above."""
@@ -91,7 +109,7 @@ class Plate(Piece):
                 f"hits from more than {length(PLATE_HIT_HEIGHT_M)} count; "
                 f"wanted a plate at least {around.in_unit.rounded_up(least)} high",
             )
-        yield from around.rises(self, (*path, "sinks_to"), self.sinks_to, self.at[2])
+        yield from around.rises(self, (*path, "sinks_to"), self.mover(""))
 
     def _links(self, path: FieldPath, gates: tuple[str, ...]) -> Iterator[Problem]:
         none = "the level has no gates that a plate could open"

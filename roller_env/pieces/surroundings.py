@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from roller_env.pieces.piece import Piece, Solid
+from roller_env.pieces.ground import Ground
+from roller_env.pieces.piece import Mover, Piece, Solid
 from roller_env.pieces.words import InUnit
 from roller_env.problems import FieldPath, Problem
 
@@ -47,6 +48,11 @@ class Surroundings:
         """The names of the pieces that some other one sets moving."""
         return frozenset(name for piece in self.pieces for name in piece.sets_moving())
 
+    @cached_property
+    def ground(self) -> Ground:
+        """What pieces stand on."""
+        return Ground(lambda: self.solids)
+
     def too_low(self, path: FieldPath, subject: str, height: float) -> Iterator[Problem]:
         """Yield a problem if what the subject says is not above the kill height."""
         if height <= self.kill_height:
@@ -54,17 +60,15 @@ class Surroundings:
             limit = self.in_unit.length(self.kill_height)
             yield Problem(path, f"{found}; wanted above the kill height, {limit}")
 
-    def rises(self, piece: Piece, path: FieldPath, stop: float, top: float) -> Iterator[Problem]:
-        """Yield a problem if a piece that is to go down has its stop, at ``path``, above its top.
-
-        Args:
-            piece: the piece.
-            path: of the field that says where it stops.
-            stop: where that is, metres.
-            top: where its centre is before, metres.
-        """
-        if stop > top:
-            given = path[-1] in piece.model_fields_set
-            found = "found" if given else "not given, so it is the original's"
-            allowed = f"wanted at most the height of 'at', {self.in_unit.length(top)}"
-            yield Problem(path, f"{found} {self.in_unit.length(stop)}; {allowed}")
+    def rises(self, piece: Piece, path: FieldPath, mover: Mover) -> Iterator[Problem]:
+        """Yield a problem if a piece would move upwards to where ``path`` says that it stops."""
+        length, top = self.in_unit.length, mover.solid.centre[2]
+        if mover.stop <= top:
+            return
+        found = f"found {length(mover.stop)}"
+        if path[-1] not in piece.model_fields_set:
+            face = self.ground.under(mover.solid)
+            found = "not given, and it stands on nothing that would tell it"
+            if face is not None:
+                found = f"not given, so on ground at {length(face)} it is {length(mover.stop)}"
+        yield Problem(path, f"{found}; wanted at most the height of 'at', {length(top)}")
