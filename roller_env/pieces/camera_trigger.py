@@ -36,10 +36,16 @@ class CameraTrigger(Piece):
     ``at``, and from then on until something else changes it; it has no box.
     """
 
-    kind: Literal["overhead", "retreat", "first_person"]
-    at: Point
-    size: Size | None = Field(None, description="For overhead and retreat.")
-    reach: PositiveLength = Field(quants(10.0), description="For first_person.")
+    kind: Literal["overhead", "retreat", "first_person"] = Field(
+        description="When it fires, and what the camera does then."
+    )
+    at: Point = Field(description="Its centre.")
+    size: Size | None = Field(
+        None, description="Full edge lengths, for `overhead` and `retreat`, which need it."
+    )
+    reach: PositiveLength = Field(
+        quants(10.0), description="For `first_person`, which is a ball and has no size."
+    )
 
     @model_validator(mode="after")
     def _shape_fits_kind(self) -> CameraTrigger:

@@ -35,25 +35,25 @@ _GOLD: Final = (Paint("gold/", "#ffc928", emission=0.28, specular=0.9, shininess
 class CoinLine(Part):
     """Coins at equal distances on a straight line, both ends included."""
 
-    start: Point
-    end: Point
-    count: Annotated[int, Field(strict=True, ge=2, le=MAX_COINS)]
+    start: Point = Field(description="The first coin.")
+    end: Point = Field(description="The last one.")
+    count: Annotated[int, Field(strict=True, ge=2, le=MAX_COINS)] = Field(description="How many.")
 
 
 class CoinArc(Part):
     """Coins at equal angles on a level arc, both ends included."""
 
-    centre: Point
-    radius: PositiveLength
-    from_deg: Degrees = Field(description="Angle of the first coin, from +x towards +y.")
+    centre: Point = Field(description="Of the circle.")
+    radius: PositiveLength = Field(description="Of the circle.")
+    from_deg: Degrees = Field(description="Angle of the first coin: 0 is +x, 90 is +y.")
     to_deg: Degrees = Field(description="Angle of the last coin.")
-    count: Annotated[int, Field(strict=True, ge=2, le=MAX_COINS)]
+    count: Annotated[int, Field(strict=True, ge=2, le=MAX_COINS)] = Field(description="How many.")
 
 
 class CoinGrid(Part):
     """Coins in level rows and columns round a centre."""
 
-    centre: Point
+    centre: Point = Field(description="Of the grid.")
     spacing: PlanePoint = Field(description="Distance between neighbours along x and y.")
     count: tuple[
         Annotated[int, Field(strict=True, ge=1, le=MAX_COINS)],
@@ -74,7 +74,7 @@ class Coins(Piece):
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
-    at: Point | None = None
+    at: Point | None = Field(None, description="Centre of one coin.")
     line: CoinLine | None = None
     arc: CoinArc | None = None
     grid: CoinGrid | None = None

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
+from pydantic import Field
 
 from roller_env.pieces.fields import Point, Size
 from roller_env.pieces.look import Fly, Paint, Shape, part
@@ -38,10 +39,10 @@ _SPARK: Final = (Paint("spark/", SPARK_COLOUR, emission=1.0),)
 
 
 class Finish(Piece):
-    """The end of the level: a box without substance."""
+    """The end of the level: a box without substance. Who touches it has won."""
 
-    at: Point
-    size: Size
+    at: Point = Field(description="Its centre.")
+    size: Size = Field(description="Full edge lengths.")
 
     def region(self, touch: float) -> Region:
         """Return where the ball touches it."""

@@ -11,7 +11,14 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from roller_env.pieces.fields import Name, NonNegativeLength, Part, Point, PositiveLength
+from roller_env.pieces.fields import (
+    MaterialName,
+    NonNegativeLength,
+    OptionalName,
+    Part,
+    Point,
+    PositiveLength,
+)
 from roller_env.pieces.piece import UNTURNED, Count, Float64, Piece, Solid
 from roller_env.problems import FieldPath
 from roller_env.units import quants
@@ -25,10 +32,12 @@ COIN_HEIGHT_M: Final = quants(16.0)
 class FloorCell(Part):
     """What one character of a floor plan stands for."""
 
-    material: str = "default"
-    coin: bool = Field(False, strict=True, description="A coin lies on the middle of the cell.")
+    material: MaterialName = "default"
+    coin: bool = Field(
+        False, strict=True, description="Whether a coin lies on the middle of the cell."
+    )
     wall: NonNegativeLength = Field(
-        0.0, description="Height of a block standing on the cell; 0 for none."
+        0.0, description="Height of a block on the cell, 0 for none; its coin lies on the block."
     )
 
 
@@ -44,13 +53,12 @@ class FloorPlan(Piece):
     cell: PositiveLength = Field(description="Edge length of one character's square.")
     thickness: PositiveLength = Field(quants(16.0), description="Downwards from the upper face.")
     plan: Annotated[str, Field(max_length=MAX_PLAN_CELLS)] = Field(
-        description="The drawing: a block of text ('plan: |'), all rows equally long; a blank one "
-        "is empty."
+        description="The drawing: a block of text, all rows equally long; a blank one is empty."
     )
     legend: dict[str, FloorCell] = Field(
-        default_factory=dict, description="More characters, or other meanings of # and o."
+        default_factory=dict, description="More characters, or other meanings of `#` and `o`."
     )
-    name: Name | None = None
+    name: OptionalName = None
 
     @field_validator("legend")
     @classmethod

@@ -30,10 +30,10 @@ _PAINT: Final = states("gate", ("#ff4d4d", 0.5), ("#ffb02e", 0.7), ("#35c46f", 0
 class Gate(Piece):
     """A slab that sinks out of the way when one of its plates is down."""
 
-    name: Name
-    at: Point = Field(description="Centre of the closed gate.")
-    size: Size
-    yaw_deg: Degrees = 0.0
+    name: Name = Field(description="For `opens` of its plates; no two pieces share one.")
+    at: Point = Field(description="Its centre while it is closed.")
+    size: Size = Field(description="Full edge lengths.")
+    yaw_deg: Degrees = Field(0.0, description="Positive turns it to the left, as a box.")
     lowers_to: Length | None = Field(
         None,
         description="Height of its centre when it is open. If left out, its upper face is then "

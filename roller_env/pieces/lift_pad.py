@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import numpy as np
 from pydantic import Field
 
-from roller_env.pieces.fields import Name, Number, Point, Seconds, Size
+from roller_env.pieces.fields import Number, OptionalName, Point, Seconds, Size
 from roller_env.pieces.look import ACTIVE, IDLE, LIGHT, Shape, part, states
 from roller_env.pieces.piece import TOUCHING_M, UNTURNED, Piece, Region, Solid, Vector, half_of
 from roller_env.problems import FieldPath, Problem
@@ -23,13 +23,15 @@ _PAINT: Final = states("pad", ("#27b5e8", 0.25), ("#8decff", 0.7))
 class LiftPad(Piece):
     """A solid pad that throws whatever enters it upwards with a steady force for a while."""
 
-    at: Point
-    size: Size
+    at: Point = Field(description="Its centre.")
+    size: Size = Field(description="Full edge lengths.")
     force_n: Annotated[Number, Field(gt=0.0, le=1e6)] = Field(
-        quants(500.0), description="Newtons upwards; more than the ball's weight."
+        quants(500.0), description="Newtons, upwards; more than the ball's weight (9.8 N)."
     )
-    duration_s: Seconds = Field(5.0, description="How long it pushes, once entered.")
-    name: Name | None = None
+    duration_s: Seconds = Field(
+        5.0, description="How long it pushes, once entered; it cannot fire again until then."
+    )
+    name: OptionalName = None
 
     def solids(self, source: str) -> Iterator[Solid]:
         """Yield itself."""

@@ -48,10 +48,10 @@ class Plate(Piece):
     above ``at``; with the original's ball of 16 quants, build it thicker than 18 quants.
     """
 
-    name: Name
-    at: Point = Field(description="Centre of the plate before it sinks.")
-    size: Size
-    opens: tuple[str, ...] = Field(description="Names of the gates it opens.")
+    name: Name = Field(description="No two pieces share one.")
+    at: Point = Field(description="Its centre before it sinks.")
+    size: Size = Field(description="Full edge lengths.")
+    opens: tuple[str, ...] = Field(description="The names of its gates, at least one.")
     sinks_to: Length | None = Field(
         None,
         description="Height of its centre when it is down. If left out, 13 quants under the upper "

@@ -13,8 +13,9 @@ from pydantic_core import PydanticCustomError
 from roller_env.pieces.fields import (
     MIN_LENGTH_M,
     Degrees,
-    Name,
+    MaterialName,
     Number,
+    OptionalName,
     Part,
     Point,
     PositiveLength,
@@ -42,11 +43,12 @@ class Opening(Part):
     """A slot along the whole length of a tube."""
 
     toward_deg: Degrees = Field(
-        description="Direction of its middle: for an upright tube the compass angle from +x to "
-        "+y; for a lying one the angle from straight up."
+        description="Where its middle looks. For an upright tube the compass angle from +x to +y: "
+        "0 is forward, 90 left, 180 back. For a lying one the angle from straight up."
     )
     width_deg: Annotated[Number, Field(gt=0.0, lt=360.0)] = Field(
-        description="Panels whose middle lies within half of this are left out."
+        description="Panels whose middle lies within half of it are left out, so that it is as "
+        "wide as whole panels."
     )
 
 
@@ -55,16 +57,16 @@ class Tube(Piece):
 
     is_pipe: ClassVar[bool] = True
 
-    start: Point = Field(description="Middle of the pipe's one end.")
-    end: Point = Field(description="Middle of its other end.")
+    start: Point = Field(description="Middle of one end of the pipe.")
+    end: Point = Field(description="Middle of the other end.")
     inner_radius: PositiveLength = Field(description="From its axis to the middle of a panel.")
-    thickness: PositiveLength = quants(4.0)
+    thickness: PositiveLength = Field(quants(4.0), description="Of its wall, outwards.")
     sides: Annotated[int, Field(strict=True, ge=3, le=64)] = Field(
-        16, description="Number of flat panels around it."
+        16, description="How many flat panels it is made of."
     )
-    opening: Opening | None = None
-    material: str = "glass"
-    name: Name | None = None
+    opening: Opening | None = Field(None, description="A slot along its whole length.")
+    material: MaterialName = "glass"
+    name: OptionalName = None
 
     @model_validator(mode="after")
     def _has_length(self) -> Tube:
