@@ -91,3 +91,12 @@ def test_the_script_writes_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(level_tables, "PAGE", page)
     level_tables.main()
     assert page.read_text(encoding="utf-8") == TEXT
+
+
+def test_the_worked_example_of_a_piece_is_its_module() -> None:
+    root = DOCS.parents[1]
+    section = (root / "CONTRIBUTING.md").read_text(encoding="utf-8").split("## Adding a piece")[1]
+    module = (root / "roller_env" / "pieces" / "lift_pad.py").read_text(encoding="utf-8")
+    code = {line.strip() for line in module.splitlines()}
+    shown = "".join(re.findall(r"```python\n(.*?)```", section.split("\n## ")[0], re.DOTALL))
+    assert {line.strip() for line in shown.splitlines()} - code == {"..."}
