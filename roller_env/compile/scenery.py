@@ -206,8 +206,9 @@ def _add_shape(spec: mujoco.MjSpec, level: Level, shape: Shape, meshes: dict[int
     for paint in shape.paints:
         if spec.material(paint.name) is None:
             _add_paint(spec, paint)
-    if isinstance(shape.paint, str) and spec.material(shape.paint) is None:
-        _add_level_material(spec, shape.paint, level.material(shape.paint))
+    material = shape.materials[0]
+    if spec.material(material) is None:
+        _add_level_material(spec, material, level.material(material))
     if isinstance(shape.form, Surface):
         if id(shape.form) not in meshes:
             meshes[id(shape.form)] = shape.name
@@ -216,7 +217,6 @@ def _add_shape(spec: mujoco.MjSpec, level: Level, shape: Shape, meshes: dict[int
     else:
         kind = getattr(mujoco.mjtGeom, f"mjGEOM_{shape.form.upper()}")
         form = {"type": kind, "size": shape.size}
-    material = shape.paint if isinstance(shape.paint, str) else shape.paint[0].name
     _add(
         spec.body(shape.carrier) if shape.carrier else spec.worldbody,
         shape.name,

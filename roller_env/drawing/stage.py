@@ -20,6 +20,7 @@ from roller_env.game.state import GameState
 from roller_env.level.expand import expand, shapes
 from roller_env.level.schema import Level
 from roller_env.physics.presets import PhysicsPreset
+from roller_env.pieces.coin import coin_shapes
 from roller_env.pieces.look import Fly, Run, Shape, Spin, part
 from roller_env.pieces.piece import Mover, Piece, number_of
 
@@ -57,6 +58,8 @@ class Stage:
             for source, piece in level.pieces()
             if (machine := _Machine.of(model, piece, source, expand(level).movers)) is not None
         ]
+        coins = coin_shapes(expand(level).coins)
+        self._coins = np.array([model.geom(c.name).id for c in coins], dtype=np.int64)
         self._spinning, self._spins = self._moving(seen, Spin)
         self._running, self._runs = self._moving(seen, Run)
         self._flying, self._flights = self._moving(seen, Fly)
@@ -77,7 +80,7 @@ class Stage:
         mujoco.mj_camlight(self.model, self.data)
         for machine in self._machines:
             self._show_phase(machine, state, row)
-        self._hide(self._spinning, state.coin_taken[row, : len(self._spinning)])
+        self._hide(self._coins, state.coin_taken[row, : len(self._coins)])
         self._spin(time_s)
         self._run(time_s)
         self._fly(time_s)
@@ -117,7 +120,7 @@ class Stage:
             self._hide(geom, phase not in seen_in)
 
     def _spin(self, time_s: float) -> None:
-        """Let what spins do so; only coins do."""
+        """Let what spins do so."""
         turns, bob, bobs, phase = self._spins
         angle = 2.0 * math.pi * turns * time_s + phase
         up = bob * np.sin(2.0 * math.pi * bobs * time_s + phase)
@@ -180,11 +183,11 @@ class _Machine(NamedTuple):
         parts = [
             (
                 model.geom(shape.name).id,
-                [model.material(p.name).id for p in shape.paint],
+                [model.material(name).id for name in shape.materials],
                 shape.seen_in,
             )
             for shape in piece.looks(number)
-            if shape.has_phases and not isinstance(shape.paint, str)
+            if shape.has_phases
         ]
         if not parts:
             return None

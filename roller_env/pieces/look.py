@@ -124,12 +124,17 @@ class Shape:
     @property
     def has_phases(self) -> bool:
         """Whether the piece's phase changes how it looks."""
-        return self.seen_in != PHASES or len(self.paints) > 1
+        return self.seen_in != PHASES or len(self.materials) > 1
 
     @property
     def paints(self) -> tuple[Paint, ...]:
         """Its own paints; none if it is of a material of the level."""
         return () if isinstance(self.paint, str) else self.paint
+
+    @property
+    def materials(self) -> tuple[str, ...]:
+        """The names of what it is painted with, by phase."""
+        return tuple(paint.name for paint in self.paints) or (str(self.paint),)
 
 
 def part(kind: str, *numbers: int) -> str:

@@ -180,10 +180,10 @@ def _make_puppets(spec: mujoco.MjSpec, seen: Iterable[Shape]) -> list[_Puppet]:
         if isinstance(shape.motion, Fly) or not (shape.motion or shape.has_phases):
             continue
         geom = spec.geom(shape.name)
-        for paint in shape.paints:
-            puppet = _Puppet(shape.name, paint.name)
+        for material in shape.materials:
+            puppet = _Puppet(shape.name, material)
             body = spec.worldbody.add_body(name=_puppet_name(puppet), mocap=True, pos=AWAY)
-            _copy_geom(geom, body, paint.name)
+            _copy_geom(geom, body, material)
             puppets.append(puppet)
         spec.delete(geom)
     return puppets
