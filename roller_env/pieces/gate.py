@@ -48,7 +48,7 @@ class Gate(Piece):
 
     def mover(self, source: str) -> Mover:
         """Return the gate, which a `Level` has settled."""
-        assert self.lowers_to is not None, "no level has settled it"
+        assert self.lowers_to is not None, "a Level settles it when it is built"
         return Mover(self.name, self._solid(source), self.lowers_to, self.speed)
 
     def _solid(self, source: str) -> Solid:

@@ -65,7 +65,7 @@ class Plate(Piece):
 
     def mover(self, source: str) -> Mover:
         """Return the plate, which a `Level` has settled."""
-        assert self.sinks_to is not None, "no level has settled it"
+        assert self.sinks_to is not None, "a Level settles it when it is built"
         return Mover(self.name, self._solid(source), self.sinks_to, self.speed)
 
     def _solid(self, source: str) -> Solid:
