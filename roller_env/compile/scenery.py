@@ -23,7 +23,7 @@ from roller_env.compile.mjcf import BALL, build_spec, machine_name, quaternion
 from roller_env.level.expand import expand, shapes
 from roller_env.level.schema import Level, Material
 from roller_env.physics.presets import PhysicsPreset
-from roller_env.pieces.look import Fly, Paint, Shape, part
+from roller_env.pieces.look import METAL, Fly, Paint, Shape, part
 from roller_env.pieces.piece import Solid
 from roller_env.pieces.surfaces import Surface, box_surfaces
 
@@ -124,9 +124,8 @@ def _add_ground(spec: mujoco.MjSpec, level: Level) -> None:
     for geom in spec.worldbody.geoms:
         if geom.name.startswith("solid_"):
             geom.group = _HIDDEN_GROUP
-    everything = expand(level)
     by_material: dict[str, list[Solid]] = defaultdict(list)
-    for solid in merge_solids(s for s in everything.ground if s.source not in everything.pipes):
+    for solid in merge_solids(expand(level).decks):
         by_material[solid.material].append(solid)
     for name, pieces in by_material.items():
         material = level.material(name)
@@ -196,9 +195,9 @@ def _paint_ball(spec: mujoco.MjSpec) -> None:
 def _paint_machines(spec: mujoco.MjSpec, level: Level) -> None:
     """Give what moves or does something a dark body."""
     everything = expand(level)
-    _add_material(spec, "metal/", "#39424e", specular=0.6, shininess=0.6)
+    _add_paint(spec, METAL)
     for name in (*map(machine_name, everything.machines), *(m.name for m in everything.movers)):
-        spec.geom(name).material = "metal/"
+        spec.geom(name).material = METAL.name
 
 
 def _add_shape(spec: mujoco.MjSpec, level: Level, shape: Shape, meshes: dict[int, str]) -> None:

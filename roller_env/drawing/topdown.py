@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
+from roller_env.pieces.look import METAL
 from roller_env.pieces.piece import Solid
 
 Float64 = npt.NDArray[np.float64]
@@ -94,8 +95,8 @@ def draw_paths(
         name = f"{storey.low:.0f} m to {storey.high:.0f} m high" if side else "from above"
         _finish_axes(axes, name, "y (m)", *storey.limits)
     if side is not None:
-        pipes = [s for s in expand(level).ground if s.source in expand(level).pipes]
-        boxes = [box for storey in storeys for box in storey.boxes] + _coloured(level, pipes)
+        boxes = [box for storey in storeys for box in storey.boxes]
+        boxes += _coloured(level, expand(level).pipes)
         _draw_boxes(side, boxes, _SIDE)
         _draw_pieces(side, level, _SIDE, -np.inf, np.inf)
         _draw_lines(side, paths, outcomes, _SIDE, -np.inf, np.inf)
@@ -108,9 +109,7 @@ def draw_paths(
 
 def _storeys(level: Level) -> list[_Storey]:
     """Cut the level where nothing but tubes is for a good height."""
-    everything = expand(level)
-    ground = [solid for solid in everything.ground if solid.source not in everything.pipes]
-    boxes = _coloured(level, ground) + _machine_boxes(level)
+    boxes = _coloured(level, expand(level).decks) + _machine_boxes(level)
     spans = sorted(
         ((*_span(box[0]), index) for index, box in enumerate(boxes)), key=lambda span: span[0]
     )
@@ -139,7 +138,7 @@ def _machine_boxes(level: Level) -> list[tuple[Solid, Colour]]:
             colours.setdefault(source, paint.colour)
     everything = expand(level)
     machines = (*(mover.solid for mover in everything.movers), *everything.machines)
-    return [(solid, _rgba(colours[solid.source])) for solid in machines]
+    return [(solid, _rgba(colours.get(solid.source, METAL.colour))) for solid in machines]
 
 
 def _side_limits(storeys: Sequence[_Storey], paths: Sequence[Float64]) -> tuple[Float64, Float64]:

@@ -33,7 +33,8 @@ class ExpandedLevel:
         solids: what stands still.
         movers: what is solid and moves, where it is at the start.
         mover_kinds: the kind of piece that each of them is.
-        pipes: the sources of those that are no ground to see: of tubes.
+        decks: what of ``solids`` is ground, but for pipes.
+        pipes: what of them is pipes, which look otherwise and lead from deck to deck.
         coins: (K, 3) float64 centres, metres.
         coin_sources: the piece that each coin comes from, as a path such as ``coins[0]``.
         regions: where pieces act on the ball, by kind of piece.
@@ -42,7 +43,8 @@ class ExpandedLevel:
     solids: tuple[Solid, ...]
     movers: tuple[Mover, ...]
     mover_kinds: tuple[type[Piece], ...]
-    pipes: frozenset[str]
+    decks: tuple[Solid, ...]
+    pipes: tuple[Solid, ...]
     coins: Float64
     coin_sources: tuple[str, ...]
     regions: dict[type[Piece], tuple[Region, ...]]
@@ -83,13 +85,17 @@ def expand(level: Level) -> ExpandedLevel:
 def _expand(level: Level) -> ExpandedLevel:
     touch = level.ball.radius + TOUCH_TOLERANCE_M
     solids: list[Solid] = []
+    decks: list[Solid] = []
+    pipes: list[Solid] = []
     movers: list[Mover] = []
     mover_kinds: list[type[Piece]] = []
     coins: list[Float64] = [np.zeros((0, 3))]
     coin_sources: list[str] = []
     regions: dict[type[Piece], list[Region]] = defaultdict(list)
     for source, piece in level.pieces():
-        solids += piece.solids(source)
+        still = list(piece.solids(source))
+        solids += still
+        (pipes if piece.is_pipe else decks).extend(solid for solid in still if solid.material)
         mover, region, own = piece.mover(source), piece.region(touch), piece.coins()
         if mover is not None:
             movers.append(mover)
@@ -102,7 +108,8 @@ def _expand(level: Level) -> ExpandedLevel:
         solids=tuple(solids),
         movers=tuple(movers),
         mover_kinds=tuple(mover_kinds),
-        pipes=frozenset(source for source, piece in level.pieces() if piece.is_pipe),
+        decks=tuple(decks),
+        pipes=tuple(pipes),
         coins=np.concatenate(coins).astype(np.float64),
         coin_sources=tuple(coin_sources),
         regions={kind: tuple(found) for kind, found in regions.items()},

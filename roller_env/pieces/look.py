@@ -40,6 +40,9 @@ class Paint(NamedTuple):
     texture: Literal["", "chequers"] = ""
 
 
+METAL: Final = Paint("metal/", "#39424e", specular=0.6, shininess=0.6)
+"""Of the solids of whatever moves or does something."""
+
 LIGHT: Final = Paint("ring/", "#bff0ff59", emission=0.8)
 """Of what is nothing but light."""
 

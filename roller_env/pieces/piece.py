@@ -110,8 +110,8 @@ class Piece(Part):
     What a kind does not have it leaves as it is here: nothing.
 
     Attributes:
-        is_pipe: whether its solids are no ground: they have a look of their own, and a map may be
-            cut through them.
+        is_pipe: whether its solids are pipes, not decks: it says itself how they look, and a map
+            may be cut through them.
     """
 
     is_pipe: ClassVar[bool] = False
