@@ -42,7 +42,7 @@ def compiled_with_packages(
 
     The function may use functions and constants of all modules in its own directory, and in those
     of the packages ``others``: what was kept of it is compiled anew when any of them has changed.
-    One that does not make arrays consists of `part`s.
+    One that does not make arrays consists of `device_function`s.
     """
 
     def decorate(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -62,7 +62,7 @@ compiled_with_package = compiled_with_packages()
 """Decorates a function that uses those of its own directory alone."""
 
 
-def part(function: Callable[_P, _R]) -> Callable[_P, _R]:
+def device_function(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Return ``function`` compiled as part of the kernels that use it, and kept with them.
 
     It makes no arrays. So Numba need not count who holds the dozens that are handed from one to the
@@ -72,7 +72,7 @@ def part(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def inlined(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Return ``function`` compiled as a `part`, and put where it is called.
+    """Return ``function`` compiled as a `device_function`, and put where it is called.
 
     For what is handed dozens of arrays, which would be copied for the call.
     """

@@ -192,7 +192,7 @@ def _gate(draw: Draw, name: str, origin: Origin) -> Gate:
         at=at,
         size=(0.3, draw(numbers(1.0, 5.0)), height),
         yaw_deg=yaw,
-        lowers_to=at[2] - draw(numbers(0.1, 4.0)),
+        lowers_to=draw(st.none() | numbers(0.1, 4.0).map(lambda depth: at[2] - depth)),
         speed=draw(numbers(0.05, 2.0)),
     )
 
@@ -203,7 +203,7 @@ def _plate(
     x, opens = place
     size = (1.5, 2.0, 2 * (0.65 - ball.radius) + draw(numbers(0.0, 0.5)))
     at = _moved(origin, (x, 0.0, draw(numbers(0.0, 0.2))))
-    sinks_to = at[2] - draw(numbers(0.0, 0.3))
+    sinks_to = draw(st.none() | numbers(0.0, 0.3).map(lambda depth: at[2] - depth))
     speed = draw(numbers(0.01, 0.5))
     return Plate(name=name, at=at, size=size, opens=opens, sinks_to=sinks_to, speed=speed)
 

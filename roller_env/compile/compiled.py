@@ -9,8 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.compile.mjcf import BALL, FORCE_ACTUATORS, build_spec
+from roller_env.level.expand import expand
 from roller_env.level.schema import Level
 from roller_env.physics.presets import PhysicsPreset, physics_preset
+from roller_env.pieces.gate import Gate
+from roller_env.pieces.plate import Plate
 
 Addresses = npt.NDArray[np.int64]
 
@@ -71,8 +74,9 @@ def compile_level(level: Level, physics: str | PhysicsPreset = "default") -> Com
     # since the MJCF flag for it is one that MuJoCo before 3.3 does not load.
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     joint = model.joint(BALL)
-    plates = [plate.name for plate in level.plates]
-    gates = [gate.name for gate in level.gates]
+    plates, gates = (
+        [mover.name for mover in expand(level).movers_of(kind)] for kind in (Plate, Gate)
+    )
     return CompiledLevel(
         level=level,
         preset=preset,

@@ -1,4 +1,4 @@
-"""Level -> MjSpec, one small function a piece.
+"""Level -> MjSpec, of the shapes that its pieces stand for.
 
 What the physics needs and no more: the ball on its free joint, static boxes on the world body, one
 slide joint and one servo for each plate and gate, three motors on the ball. Coins, triggers and
@@ -17,10 +17,7 @@ from roller_env.level.expand import expand
 from roller_env.level.schema import Level, Material
 from roller_env.physics.materials import contact_parameters
 from roller_env.physics.presets import PhysicsPreset
-from roller_env.pieces.gate import Gate
-from roller_env.pieces.lift_pad import LiftPad
-from roller_env.pieces.piece import Solid, rotation_matrix
-from roller_env.pieces.plate import Plate
+from roller_env.pieces.piece import Mover, Solid, path_of
 
 BALL: Final = "ball"
 FORCE_ACTUATORS: Final = ("force_x", "force_y", "lift")
@@ -60,20 +57,18 @@ def build_spec(level: Level, preset: PhysicsPreset) -> mujoco.MjSpec:
     spec.modelname = level.name
     _set_options(spec, level, preset)
     _add_ball(spec, level)
-    merged = merge_solids(expand(level).ground)
+    everything = expand(level)
+    merged = merge_solids(everything.ground)
     names = {solid.material for solid in merged}
     contacts = {name: _contact(level, preset, level.material(name)) for name in names}
     for number, solid in enumerate(merged):
-        _add_solid(spec, solid, contacts[solid.material], number)
-    for pad_number, pad in enumerate(level.lift_pads):
-        _add_lift_pad(spec, level, preset, pad, pad_number)
-    for plate in level.plates:
-        _add_mover(spec, level, preset, plate, plate.sinks_to, 0.0)
-    for gate in level.gates:
-        _add_mover(spec, level, preset, gate, gate.lowers_to, gate.yaw_deg)
-    # The ball's, the solids', and one of each that stands or moves.
-    pieces = 1 + len(merged) + len(level.lift_pads) + len(level.plates) + len(level.gates)
-    if pieces <= MIDPHASE_GEOMS:
+        _add_solid(spec, solid, contacts[solid.material], f"solid_{number}_{solid.material}")
+    smooth = _contact(level, preset, level.material(""))
+    for solid in everything.machines:
+        _add_solid(spec, solid, smooth, machine_name(solid))
+    for mover in everything.movers:
+        _add_mover(spec, level, mover, smooth)
+    if len(spec.geoms) <= MIDPHASE_GEOMS:
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     return spec
 
@@ -141,62 +136,50 @@ def _contact(level: Level, preset: PhysicsPreset, material: Material) -> dict[st
     }
 
 
-def _add_solid(spec: mujoco.MjSpec, solid: Solid, contact: dict[str, object], number: int) -> None:
+def machine_name(solid: Solid) -> str:
+    """Return ``lift_pad_0``, the geom of what stands still and does something: ``lift_pads[0]``."""
+    kind, number = path_of(solid.source)
+    return f"{str(kind).removesuffix('s')}_{number}"
+
+
+def _add_solid(spec: mujoco.MjSpec, solid: Solid, contact: dict[str, object], name: str) -> None:
     spec.worldbody.add_geom(
-        name=f"solid_{number}_{solid.material}",
+        name=name,
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=solid.half_size,
         pos=solid.centre,
-        quat=_quaternion(np.array(solid.rotation)),
+        quat=quaternion(np.array(solid.rotation)),
         **contact,
     )
 
 
-def _add_lift_pad(
-    spec: mujoco.MjSpec, level: Level, preset: PhysicsPreset, pad: LiftPad, number: int
-) -> None:
-    spec.worldbody.add_geom(
-        name=f"lift_pad_{number}",
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[edge / 2 for edge in pad.size],
-        pos=pad.at,
-        **_contact(level, preset, Material()),
-    )
-
-
-def _add_mover(
-    spec: mujoco.MjSpec,
-    level: Level,
-    preset: PhysicsPreset,
-    piece: Plate | Gate,
-    stop_m: float,
-    yaw_deg: float,
-) -> None:
-    """Add a slab that an integrated-velocity servo moves down its slide joint to ``stop_m``.
+def _add_mover(spec: mujoco.MjSpec, level: Level, mover: Mover, contact: dict[str, object]) -> None:
+    """Add a slab that an integrated-velocity servo moves down its slide joint to its stop.
 
     The servo's control is the slab's velocity in m/s; its activation is the set-point, clamped
     where the original stops. The original tests ``z > stop`` before each decrement, so it ends up
     to one frame of travel below the stop: the clamp lies half a frame below, on average the same,
     and the slab does pass the stop.
     """
-    travel = stop_m - 0.5 * piece.speed / SCRIPT_RATE_HZ - piece.at[2]
+    name, solid = mover.name, mover.solid
+    travel = mover.stop - 0.5 * mover.speed / SCRIPT_RATE_HZ - solid.centre[2]
     mass = MOVER_MASS_RATIO * level.ball.mass_kg
     kp = mass * SERVO_FREQUENCY**2
     body = spec.worldbody.add_body(
-        name=piece.name,
-        pos=piece.at,
-        quat=_quaternion(np.array(rotation_matrix(yaw_deg))),
+        name=name,
+        pos=solid.centre,
+        quat=quaternion(np.array(solid.rotation)),
         gravcomp=1.0,
     )
-    body.add_joint(name=piece.name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0.0, 0.0, 1.0])
+    body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0.0, 0.0, 1.0])
     body.add_geom(
-        name=piece.name,
+        name=name,
         type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=[edge / 2 for edge in piece.size],
+        size=solid.half_size,
         mass=mass,
-        **_contact(level, preset, Material()),
+        **contact,
     )
-    servo = spec.add_actuator(name=piece.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=piece.name)
+    servo = spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=name)
     # MuJoCo's intvelocity, spelt out: the shortcut would write an attribute that 3.x does not know.
     servo.dyntype = mujoco.mjtDyn.mjDYN_INTEGRATOR
     servo.gainprm[0] = kp
@@ -209,7 +192,7 @@ def _add_mover(
     servo.forcerange = [-most, most]
 
 
-def _quaternion(rotation: np.ndarray) -> np.ndarray:
+def quaternion(rotation: np.ndarray) -> np.ndarray:
     """Return the unit quaternion (w, x, y, z) of a rotation matrix (3, 3)."""
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, rotation.reshape(9))

@@ -2,8 +2,8 @@
 
 `add_scenery` changes a spec that `roller_env.compile.mjcf.build_spec` made. Everything it adds is
 without mass and touches nothing, and no joint is added, so that the positions (``qpos``) of a
-simulation can be put into the scenery's model as they are. What moves or changes its colour while
-playing has a name made by `part`.
+simulation can be put into the scenery's model as they are. What is seen of pieces besides their
+solids they say themselves, in `roller_env.pieces.piece.Piece.looks`.
 """
 
 from __future__ import annotations
@@ -19,65 +19,20 @@ import numpy.typing as npt
 
 from roller_env.compile import textures
 from roller_env.compile.merge import merge_solids
-from roller_env.compile.mjcf import BALL, build_spec
-from roller_env.compile.surfaces import Surface, box_surfaces, full_turn, lathe, tube_surface
-from roller_env.level.expand import expand
+from roller_env.compile.mjcf import BALL, build_spec, machine_name, quaternion
+from roller_env.level.expand import expand, shapes
 from roller_env.level.schema import Level, Material
 from roller_env.physics.presets import PhysicsPreset
-from roller_env.pieces.camera_trigger import CameraTrigger
-from roller_env.pieces.gate import Gate
-from roller_env.pieces.lift_pad import LiftPad
-from roller_env.pieces.piece import Solid, rotation_matrix
-from roller_env.pieces.plate import Plate
-from roller_env.pieces.tube import Tube
-from roller_env.units import quants
+from roller_env.pieces.look import METAL, Fly, Paint, Shape, part
+from roller_env.pieces.piece import Solid
+from roller_env.pieces.surfaces import Surface, box_surfaces
 
 Float64 = npt.NDArray[np.float64]
-
-IDLE: Final = "idle"
-ACTIVE: Final = "active"
-DONE: Final = "done"
-STATES: Final = {
-    "plate": (IDLE, ACTIVE, DONE),
-    "gate": (IDLE, ACTIVE, DONE),
-    "pad": (IDLE, ACTIVE),
-}
-"""The states that plates, gates and pads tell by their material, which is called kind/state."""
-
-SPARKS: Final = 38
-"""Particles of the finish alive at once: one a frame of 1/60 s, 0.625 s long."""
-
-RING_SPACING_M: Final = quants(96.0)
-"""Distance between the bands that run along a tube."""
-
-PANE_COLOUR: Final = "#0101c8"
-PANE_ALPHA: Final = 0.70
-"""`camch2`: red, green and blue, and the opacity, of a retreat trigger's pane."""
-
-SPARK_COLOUR: Final = "#01ff64"
-"""`fire1`: red, green and blue of the finish's particles."""
-
-BAND_SPACING_M: Final = quants(32.0)
-"""Distance between the bands that run up a retreat trigger's pane."""
-
-BAND_HALF_HEIGHT_M: Final = quants(3.0)
-
-GATE_BARS: Final = 7
 
 _HIDDEN_GROUP: Final = 4
 """Geoms of the physics that a surface is drawn for; MuJoCo leaves this group out by default."""
 
 _SCENERY_GROUP: Final = 1
-
-_COIN_RADIUS_M: Final = quants(11.0)
-_COIN_HALF_THICKNESS_M: Final = quants(2.0)
-_DETAILED_COINS: Final = 500
-"""A level with more coins than this has plainer ones, or drawing would take seconds."""
-
-
-def part(kind: str, *numbers: int) -> str:
-    """Return the name of a piece of scenery; no piece of a level can be called so."""
-    return "/".join([kind, *map(str, numbers)]) + "/"
 
 
 def build_scenery(level: Level, preset: PhysicsPreset) -> mujoco.MjModel:
@@ -93,19 +48,12 @@ def add_scenery(spec: mujoco.MjSpec, level: Level) -> None:
     spec.option.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     _set_view(spec)
     _add_sky_and_sun(spec)
-    _add_state_materials(spec)
     _add_ground(spec, level)
     _paint_ball(spec)
-    _add_tubes(spec, level)
-    for plate in level.plates:
-        _dress_plate(spec, plate)
-    for gate in level.gates:
-        _dress_gate(spec, gate)
-    for number, pad in enumerate(level.lift_pads):
-        _dress_pad(spec, pad, number)
-    _add_coins(spec, level)
-    _add_triggers(spec, level)
-    _add_finish(spec, level)
+    _paint_machines(spec, level)
+    seen, meshes = list(shapes(level)), dict[int, str]()
+    for shape in seen:
+        _add_shape(spec, level, shape, meshes)
 
 
 def _add(body: Any, name: str, **attributes: Any) -> Any:
@@ -171,33 +119,13 @@ def _add_sky_and_sun(spec: mujoco.MjSpec) -> None:
     )
 
 
-def _add_state_materials(spec: mujoco.MjSpec) -> None:
-    _add_material(spec, "plate/" + IDLE, "#ffb02e", emission=0.25)
-    _add_material(spec, "plate/" + ACTIVE, "#ff6a3d", emission=0.7)
-    _add_material(spec, "plate/" + DONE, "#35c46f", emission=0.3)
-    _add_material(spec, "gate/" + IDLE, "#ff4d4d", emission=0.5)
-    _add_material(spec, "gate/" + ACTIVE, "#ffb02e", emission=0.7)
-    _add_material(spec, "gate/" + DONE, "#35c46f", emission=0.3)
-    _add_material(spec, "pad/" + IDLE, "#27b5e8", emission=0.25)
-    _add_material(spec, "pad/" + ACTIVE, "#8decff", emission=0.7)
-    _add_material(spec, "metal/", "#39424e", specular=0.6, shininess=0.6)
-    _add_material(spec, "ring/", "#bff0ff59", emission=0.8)
-    _add_material(spec, "collar/", "#e9eef3", specular=0.7, shininess=0.7)
-    _add_material(spec, "gold/", "#ffc928", emission=0.28, specular=0.9, shininess=0.6)
-    _add_material(spec, "trigger/", PANE_COLOUR, emission=0.4)
-    spec.material("trigger/").rgba[3] = alpha_of_face(PANE_ALPHA)
-    _add_material(spec, "band/", "#6f8bffa0", emission=0.6)
-    _add_material(spec, "beam/", "#4fe39a", emission=0.35)
-    _add_material(spec, "spark/", SPARK_COLOUR, emission=1.0)
-
-
 def _add_ground(spec: mujoco.MjSpec, level: Level) -> None:
     """Draw one surface for all solids of a material, in place of the physics' boxes."""
     for geom in spec.worldbody.geoms:
         if geom.name.startswith("solid_"):
             geom.group = _HIDDEN_GROUP
     by_material: dict[str, list[Solid]] = defaultdict(list)
-    for solid in merge_solids(s for s in expand(level).ground if not _of_tube(s)):
+    for solid in merge_solids(expand(level).decks):
         by_material[solid.material].append(solid)
     for name, pieces in by_material.items():
         material = level.material(name)
@@ -209,10 +137,6 @@ def _add_ground(spec: mujoco.MjSpec, level: Level) -> None:
             colour, _ = textures.parse_colour(material.colour)
             _add_level_material(spec, part("edge") + name, material, textures.edge_pixels(colour))
             _add_surface(spec, part("ground", 1) + name, edges, part("edge") + name)
-
-
-def _of_tube(solid: Solid) -> bool:
-    return solid.source.startswith("tubes[")
 
 
 def _add_level_material(
@@ -239,16 +163,26 @@ def alpha_of_face(alpha: float) -> float:
 def _add_surface(
     spec: mujoco.MjSpec, name: str, surfaces: Sequence[Surface], material: str
 ) -> None:
-    """Add a surface to look at; light falls through it as far as one can see through it."""
-    Surface.joined(surfaces).add_to(spec, name)
-    _add(
-        spec.worldbody,
-        name,
-        type=mujoco.mjtGeom.mjGEOM_MESH,
-        meshname=name,
-        material=material,
-        castshadow=bool(spec.material(material).rgba[3] == 1.0),
+    _add_mesh(spec, name, Surface.joined(surfaces))
+    geom = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": name}
+    _add(spec.worldbody, name, material=material, castshadow=_is_opaque(spec, material), **geom)
+
+
+def _add_mesh(spec: mujoco.MjSpec, name: str, surface: Surface) -> None:
+    spec.add_mesh(
+        name=name,
+        # Surfaces need not enclose anything, and nothing here has mass.
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+        uservert=surface.vertices.ravel(),
+        usernormal=surface.normals.ravel(),
+        usertexcoord=surface.texture.ravel(),
+        userface=surface.faces.ravel().astype(np.int32),
     )
+
+
+def _is_opaque(spec: mujoco.MjSpec, material: str) -> bool:
+    """Say whether something of a material casts a shadow."""
+    return bool(spec.material(material).rgba[3] == 1.0)
 
 
 def _paint_ball(spec: mujoco.MjSpec) -> None:
@@ -258,194 +192,53 @@ def _paint_ball(spec: mujoco.MjSpec) -> None:
     spec.geom(BALL).material = "ball/"
 
 
-def _add_tubes(spec: mujoco.MjSpec, level: Level) -> None:
-    panels: dict[str, list[Solid]] = defaultdict(list)
-    for solid in expand(level).ground:
-        if _of_tube(solid):
-            panels[solid.source].append(solid)
-    for number, tube in enumerate(level.tubes):
-        walls = panels[f"tubes[{number}]"]
-        if not walls:
-            continue
-        if spec.material(tube.material) is None:
-            _add_level_material(spec, tube.material, level.material(tube.material))
-        _add_surface(spec, part("tube", number), [tube_surface(tube, walls)], tube.material)
-        if ring_count(tube):
-            _add_rings(spec, tube, number)
+def _paint_machines(spec: mujoco.MjSpec, level: Level) -> None:
+    """Give what moves or does something a dark body."""
+    everything = expand(level)
+    _add_paint(spec, METAL)
+    for name in (*map(machine_name, everything.machines), *(m.name for m in everything.movers)):
+        spec.geom(name).material = METAL.name
 
 
-def ring_count(tube: Tube) -> int:
-    """Return how many bands of light run along a tube: none along one with an opening."""
-    if tube.opening is not None:
-        return 0
-    return int(math.dist(tube.start, tube.end) / RING_SPACING_M)
-
-
-def _add_rings(spec: mujoco.MjSpec, tube: Tube, number: int) -> None:
-    """Add a closed tube's collars and the bands of light that run along it."""
-    outer = (tube.inner_radius + tube.thickness) / math.cos(math.pi / tube.sides)
-    band, collar, height = outer + quants(0.5), outer + quants(3.0), quants(5.0)
-    turn = full_turn(4 * tube.sides)
-    frame = tube.frame
-    frame[:, 1] = np.cross(frame[:, 2], frame[:, 0])
-    orientation = np.empty(4)
-    mujoco.mju_mat2Quat(orientation, frame.ravel())
-    lathe([(band, -height), (band, height)], turn).add_to(spec, part("ring", number))
-    ends = [(collar, 0.0), (collar, height), (tube.inner_radius, height)]
-    ends += [(tube.inner_radius, 0.0), (collar, 0.0)]
-    # Their rims stand out of the floors that the tube ends in, just enough to be seen.
-    proud = quants(0.4)
-    for end, base in enumerate((-proud, math.dist(tube.start, tube.end) - height + proud)):
-        surface = lathe([(radius, base + z) for radius, z in ends], turn)
-        _add_surface(
-            spec,
-            part("collar", number, end),
-            [surface.moved(frame, np.array(tube.start))],
-            "collar/",
-        )
-    for ring in range(ring_count(tube)):
-        _add(
-            spec.worldbody,
-            part("ring", number, ring),
-            type=mujoco.mjtGeom.mjGEOM_MESH,
-            meshname=part("ring", number),
-            material="ring/",
-            pos=tube.start,
-            quat=orientation,
-            castshadow=False,
-        )
-
-
-def _box(half: Sequence[float], **attributes: Any) -> dict[str, Any]:
-    return {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": half, **attributes}
-
-
-def _dress_plate(spec: mujoco.MjSpec, plate: Plate) -> None:
-    """Give the plate a dark edge and a cap whose colour tells its state."""
-    spec.geom(plate.name).material = "metal/"
-    x, y, z = (edge / 2 for edge in plate.size)
-    margin = min(quants(8.0), 0.2 * min(x, y))
-    cap = _box([x - margin, y - margin, quants(0.5)], pos=[0.0, 0.0, z], material="plate/" + IDLE)
-    _add(spec.body(plate.name), part("plate") + plate.name, **cap)
-
-
-def _dress_gate(spec: mujoco.MjSpec, gate: Gate) -> None:
-    """Give the gate's slab bars whose colour tells its state."""
-    spec.geom(gate.name).material = "metal/"
-    x, y, z = (edge / 2 for edge in gate.size)
-    thickness, inset = quants(1.0), min(quants(1.0), 0.1 * max(x, y))
-    for bar in range(GATE_BARS):
-        height = z * (1.0 - (2 * bar + 1) / (GATE_BARS + 1))
-        half = (x + thickness, y - inset) if x < y else (x - inset, y + thickness)
-        size = [*half, min(quants(3.0), z / (GATE_BARS + 1))]
-        box = _box(size, pos=[0.0, 0.0, height], material="gate/" + IDLE)
-        _add(spec.body(gate.name), part("gate", bar) + gate.name, **box)
-
-
-def _dress_pad(spec: mujoco.MjSpec, pad: LiftPad, number: int) -> None:
-    """Give the pad a disc that lights up, and a column of light to rise in."""
-    spec.geom(f"lift_pad_{number}").material = "metal/"
-    radius, top = 0.42 * min(pad.size[:2]), pad.at[2] + pad.size[2] / 2
+def _add_shape(spec: mujoco.MjSpec, level: Level, shape: Shape, meshes: dict[int, str]) -> None:
+    """Add a shape; ``meshes`` names the surfaces that are there already, by their identity."""
+    for paint in shape.paints:
+        if spec.material(paint.name) is None:
+            _add_paint(spec, paint)
+    material = shape.materials[0]
+    if spec.material(material) is None:
+        _add_level_material(spec, material, level.material(material))
+    if isinstance(shape.form, Surface):
+        if id(shape.form) not in meshes:
+            meshes[id(shape.form)] = shape.name
+            _add_mesh(spec, shape.name, shape.form)
+        form = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": meshes[id(shape.form)]}
+    else:
+        kind = getattr(mujoco.mjtGeom, f"mjGEOM_{shape.form.upper()}")
+        form = {"type": kind, "size": shape.size}
     _add(
-        spec.worldbody,
-        part("pad", number),
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-        size=[radius, quants(0.5), 0.0],
-        pos=[pad.at[0], pad.at[1], top],
-        material="pad/" + IDLE,
-    )
-    reach = quants(48.0)
-    _add(
-        spec.worldbody,
-        part("glow", number),
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-        size=[radius, reach, 0.0],
-        pos=[pad.at[0], pad.at[1], top + reach],
-        material="ring/",
-        castshadow=False,
+        spec.body(shape.carrier) if shape.carrier else spec.worldbody,
+        shape.name,
+        pos=shape.at,
+        quat=quaternion(np.array(shape.rotation)),
+        material=material,
+        castshadow=_is_opaque(spec, material) and not isinstance(shape.motion, Fly),
+        **form,
     )
 
 
-def _add_coins(spec: mujoco.MjSpec, level: Level) -> None:
-    positions = expand(level).coins
-    if len(positions) == 0:
-        return
-    segments = 24 if len(positions) <= _DETAILED_COINS else 8
-    _coin_surface(segments).add_to(spec, part("coin"))
-    for number, position in enumerate(positions):
-        _add(
-            spec.worldbody,
-            part("coin", number),
-            type=mujoco.mjtGeom.mjGEOM_MESH,
-            meshname=part("coin"),
-            material="gold/",
-            pos=position,
-        )
-
-
-def _coin_surface(segments: int) -> Surface:
-    """Return a coin with a raised rim, standing upright, its axis along x."""
-    radius, rim, face = _COIN_RADIUS_M, _COIN_HALF_THICKNESS_M, 0.5 * _COIN_HALF_THICKNESS_M
-    half = [(radius, 0.0), (radius, 0.7 * rim), (0.94 * radius, rim), (0.76 * radius, rim)]
-    half += [(0.70 * radius, face), (0.0, face)]
-    profile = [(r, -h) for r, h in reversed(half)] + half[1:]
-    upright = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-    return lathe(profile, full_turn(segments)).moved(upright, np.zeros(3))
-
-
-def _add_triggers(spec: mujoco.MjSpec, level: Level) -> None:
-    """Show the retreat triggers as blue panes, as `camch2` does; the other triggers are unseen.
-
-    Bands of a lighter blue show that the pane's texture scrolls.
-    """
-    for number, trigger in enumerate(level.camera_triggers):
-        if trigger.kind != "retreat" or trigger.size is None:
-            continue
-        x, y, z = (edge / 2 for edge in trigger.size)
-        pane = _box([x, y, z], pos=trigger.at, material="trigger/", castshadow=False)
-        _add(spec.worldbody, part("trigger", number), **pane)
-        proud = quants(0.2)
-        half = [x + proud, y + proud, min(BAND_HALF_HEIGHT_M, 0.5 * z)]
-        for band in range(band_count(trigger)):
-            box = _box(half, pos=trigger.at, material="band/", castshadow=False)
-            _add(spec.worldbody, part("band", number, band), **box)
-
-
-def band_count(trigger: CameraTrigger) -> int:
-    """Return how many bands run up a trigger's pane: at least one up that of a retreat."""
-    if trigger.kind != "retreat" or trigger.size is None:
-        return 0
-    return max(1, int(trigger.size[2] / BAND_SPACING_M))
-
-
-def _add_finish(spec: mujoco.MjSpec, level: Level) -> None:
-    """Add an arch over the finish's longer side, with a chequered beam and sparks."""
-    finish = level.finish
-    x, y, z = (edge / 2 for edge in finish.size)
-    post = quants(4.0)
-    textures.add_texture(spec, "chequers/", "2d", textures.chequered_pixels(2))
-    _add_material(spec, "chequers/", texture="chequers/", emission=0.3)
-    span = np.array([0.0, 1.0, 0.0]) if y >= x else np.array([1.0, 0.0, 0.0])
-    width = max(x, y)
-    base = np.array(finish.at) - [0.0, 0.0, z]
-    top = max(2.0 * z, quants(72.0))
-    for side, sign in enumerate((-1.0, 1.0)):
-        place = base + sign * width * span + [0.0, 0.0, top / 2]
-        pillar = _box([post, post, top / 2], pos=place, material="beam/")
-        _add(spec.worldbody, part("pillar", side), **pillar)
-    half = (width + 2 * post) * span + quants(5.0) * (1.0 - span)
-    half[2] = quants(10.0)
-    middle = (finish.at[0], finish.at[1], float(base[2]) + top)
-    size = (float(half[0]), float(half[1]), float(half[2]))
-    beam = Solid(middle, size, rotation_matrix(), "chequers/", "finish")
-    _add_surface(spec, part("beam"), [box_surfaces(beam)[0]], "chequers/")
-    for spark in range(SPARKS):
-        _add(
-            spec.worldbody,
-            part("spark", spark),
-            type=mujoco.mjtGeom.mjGEOM_SPHERE,
-            size=[quants(1.0), 0.0, 0.0],
-            pos=finish.at,
-            material="spark/",
-            castshadow=False,
-        )
+def _add_paint(spec: mujoco.MjSpec, paint: Paint) -> None:
+    texture = paint.name if paint.texture else None
+    if texture is not None:
+        textures.add_texture(spec, texture, "2d", textures.chequered_pixels(2))
+    _add_material(
+        spec,
+        paint.name,
+        paint.colour,
+        texture=texture,
+        emission=paint.emission,
+        specular=paint.specular,
+        shininess=paint.shininess,
+    )
+    if paint.opacity < 1.0:
+        spec.material(paint.name).rgba[3] = alpha_of_face(paint.opacity)

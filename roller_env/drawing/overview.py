@@ -76,10 +76,8 @@ def level_corners(level: Level) -> Float64:
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
     corners = [
         signs * solid.half_size @ np.array(solid.rotation).T + solid.centre
-        for solid in expand(level).ground
+        for solid in expand(level).at_the_start
     ]
-    for pieces in (level.plates, level.gates, level.lift_pads):
-        corners += [signs * np.array(piece.size) / 2 + piece.at for piece in pieces]
     # The arch stands about twice as high as the finish itself.
     corners += [signs * np.array(level.finish.size) * [0.5, 0.5, 1.5] + level.finish.at]
     return np.concatenate([*corners, [level.start.at]])

@@ -17,7 +17,8 @@ from matplotlib.lines import Line2D
 
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
-from roller_env.pieces.piece import Solid, rotation_matrix
+from roller_env.pieces.look import METAL
+from roller_env.pieces.piece import Solid
 
 Float64 = npt.NDArray[np.float64]
 Colour = tuple[float, float, float, float]
@@ -33,9 +34,6 @@ OUTCOME_STYLES: Final = {
 """Colour and end mark of a path, by outcome."""
 
 _OTHER_STYLE: Final = ("#444444", "D")
-PLATE_COLOUR: Final = "#ffb02e"
-GATE_COLOUR: Final = "#ff4d4d"
-PAD_COLOUR: Final = "#27b5e8"
 
 _PALE: Final = 0.4
 """Share of white in the level's colours, so that the paths stand out from them."""
@@ -97,7 +95,8 @@ def draw_paths(
         name = f"{storey.low:.0f} m to {storey.high:.0f} m high" if side else "from above"
         _finish_axes(axes, name, "y (m)", *storey.limits)
     if side is not None:
-        boxes = [box for storey in storeys for box in storey.boxes] + _tube_boxes(level)
+        boxes = [box for storey in storeys for box in storey.boxes]
+        boxes += _coloured(level, expand(level).pipes)
         _draw_boxes(side, boxes, _SIDE)
         _draw_pieces(side, level, _SIDE, -np.inf, np.inf)
         _draw_lines(side, paths, outcomes, _SIDE, -np.inf, np.inf)
@@ -110,8 +109,7 @@ def draw_paths(
 
 def _storeys(level: Level) -> list[_Storey]:
     """Cut the level where nothing but tubes is for a good height."""
-    boxes = _coloured(level, (s for s in expand(level).ground if not s.source.startswith("tubes[")))
-    boxes += _machine_boxes(level)
+    boxes = _coloured(level, expand(level).decks) + _machine_boxes(level)
     spans = sorted(
         ((*_span(box[0]), index) for index, box in enumerate(boxes)), key=lambda span: span[0]
     )
@@ -132,20 +130,15 @@ def _coloured(level: Level, pieces: Iterable[Solid]) -> list[tuple[Solid, Colour
     return [(piece, _rgba(level.material(piece.material).colour)) for piece in pieces]
 
 
-def _tube_boxes(level: Level) -> list[tuple[Solid, Colour]]:
-    return _coloured(level, (s for s in expand(level).ground if s.source.startswith("tubes[")))
-
-
 def _machine_boxes(level: Level) -> list[tuple[Solid, Colour]]:
-    """Return plates, gates and lift pads as boxes."""
-    pieces = [(plate.at, plate.size, 0.0, PLATE_COLOUR) for plate in level.plates]
-    pieces += [(gate.at, gate.size, gate.yaw_deg, GATE_COLOUR) for gate in level.gates]
-    pieces += [(pad.at, pad.size, 0.0, PAD_COLOUR) for pad in level.lift_pads]
-    boxes = []
-    for at, size, yaw_deg, colour in pieces:
-        half = (size[0] / 2, size[1] / 2, size[2] / 2)
-        boxes.append((Solid(at, half, rotation_matrix(yaw_deg), "default", ""), _rgba(colour)))
-    return boxes
+    """Return what moves or does something as boxes, in the colours in which it waits."""
+    colours: dict[str, str] = {}
+    for source, piece in level.pieces():
+        for paint in (paint for shape in piece.looks(0) for paint in shape.paints):
+            colours.setdefault(source, paint.colour)
+    everything = expand(level)
+    machines = (*(mover.solid for mover in everything.movers), *everything.machines)
+    return [(solid, _rgba(colours.get(solid.source, METAL.colour))) for solid in machines]
 
 
 def _side_limits(storeys: Sequence[_Storey], paths: Sequence[Float64]) -> tuple[Float64, Float64]:
@@ -229,11 +222,8 @@ def _draw_pieces(
         outline = PolyCollection([np.array(box)], facecolors="none", edgecolors="#111111", zorder=3)
         outline.set_hatch("////")
         axes.add_collection(outline)
-    labels = [("start", level.start.at), ("finish", finish.at)]
-    labels += [(plate.name, plate.at) for plate in level.plates]
-    labels += [(gate.name, gate.at) for gate in level.gates]
-    labels += [("lift", pad.at) for pad in level.lift_pads]
-    for name, at in labels:
+    labels = [piece.label() for _, piece in level.pieces()]
+    for name, at in [("start", level.start.at), *filter(None, labels)]:
         if low < at[2] <= high:
             axes.annotate(
                 name,

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from roller_env.arrays import Float64, Int64
-from roller_env.compiled import compiled, part
+from roller_env.compiled import compiled, device_function
 from roller_env.pieces.camera_trigger import TriggerKind
 from roller_env.pieces.rules import CameraAsked
 from roller_env.units import METRES_PER_QUANT, quants
@@ -98,7 +98,7 @@ def retreat(env: int, duration_s: float, ball_x: float, camera: CameraState) -> 
         camera.mode[env] = MODE_BEHIND
 
 
-@part
+@device_function
 def settle(
     env: int, duration_s: float, ball_x: float, asked: CameraAsked, camera: CameraState
 ) -> None:

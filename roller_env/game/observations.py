@@ -12,7 +12,7 @@ from typing import Final, Literal
 import numpy as np
 
 from roller_env.arrays import Float32, Float64
-from roller_env.compiled import part
+from roller_env.compiled import device_function
 from roller_env.game.kinds import RULES
 from roller_env.pieces.rules import Entry, fraction_entry
 
@@ -89,7 +89,7 @@ def layout(parts: Iterable[Entry]) -> dict[str, slice]:
 STATE_SIZE: Final = sum(entry.size for entry in STATE_ENTRIES)
 
 
-@part
+@device_function
 def rotated(quaternion: Float64, vector: Float64) -> tuple[float, float, float]:
     """Return a vector, (3,), rotated by a unit quaternion (w, x, y, z)."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]

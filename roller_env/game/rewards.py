@@ -10,7 +10,7 @@ import numpy as np
 
 from roller_env import checks
 from roller_env.arrays import Float64, Int64
-from roller_env.compiled import part
+from roller_env.compiled import device_function
 
 RewardMode = Literal["points", "shaped"]
 
@@ -65,7 +65,7 @@ class ShapingState(NamedTuple):
         return ShapingState(np.zeros(num_envs, dtype=np.int64), np.zeros(num_envs))
 
 
-@part
+@device_function
 def next_waypoint(ball: Float64, route: Float64, length: int, radius: float, waypoint: int) -> int:
     """Return the furthest leg that the ball, (3,), has reached, or ``waypoint``.
 
@@ -86,7 +86,7 @@ def next_waypoint(ball: Float64, route: Float64, length: int, radius: float, way
     return waypoint
 
 
-@part
+@device_function
 def _leg_distance2(ball: Float64, start: Float64, end: Float64) -> float:
     """Return the squared distance of a point to the piece from ``start`` to ``end``."""
     way_x, way_y, way_z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
@@ -99,7 +99,7 @@ def _leg_distance2(ball: Float64, start: Float64, end: Float64) -> float:
     return squared
 
 
-@part
+@device_function
 def route_progress(
     ball: Float64, route: Float64, arc: Float64, length: int, waypoint: int
 ) -> float:
@@ -124,7 +124,7 @@ def route_progress(
     return fraction
 
 
-@part
+@device_function
 def shaping(before: float, after: float, terminated: bool, discount: float) -> float:
     """Return gamma * Phi(s') - Phi(s), with Phi = 0 in terminal states.
 

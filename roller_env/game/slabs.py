@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from roller_env.arrays import Float64
-from roller_env.compiled import part
+from roller_env.compiled import device_function
 from roller_env.game.bodies import Columns
 from roller_env.game.tables import Movers
 
@@ -26,7 +26,7 @@ GAP_M: Final = 0.001
 """Where a slab stops over the ball: it counts as touching, and does not brake a ball that rolls."""
 
 
-@part
+@device_function
 def lowering(
     duration_s: float,
     level: int,
@@ -64,7 +64,7 @@ def lowering(
     return velocity
 
 
-@part
+@device_function
 def _room_under(
     duration_s: float,
     centre: Float64,
@@ -93,14 +93,14 @@ def _room_under(
     return now, soon
 
 
-@part
+@device_function
 def _beyond(start: float, way: float, half: float) -> float:
     """Return how far beyond +- ``half`` all of an interval of ``way`` from ``start`` lies."""
     low, high = min(start, start + way), max(start, start + way)
     return max(low - half, -half - high, 0.0)
 
 
-@part
+@device_function
 def _height(across_x: float, across_y: float, radius: float) -> float:
     """Return a ball's height over its centre at a distance from it, ``-inf`` beyond the radius."""
     left2 = radius * radius - across_x * across_x - across_y * across_y

@@ -142,8 +142,7 @@ def _region_row(region: Region) -> list[float]:
 
 
 def _movers(level: ExpandedLevel, kind: type[Piece]) -> list[list[float]]:
-    found = (piece.mover("") for piece in level.of(kind))
-    return [_mover_row(mover) for mover in found if mover is not None]
+    return [_mover_row(mover) for mover in level.movers_of(kind)]
 
 
 def _mover_row(mover: Mover) -> list[float]:

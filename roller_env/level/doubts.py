@@ -6,11 +6,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from roller_env.level.check import starts, surroundings
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
-from roller_env.level.space import burying, held_up, inside, is_static, starts
-from roller_env.level.words import InUnit, Unit, coin_groups
-from roller_env.pieces.piece import TOUCHING_M, Solid
+from roller_env.pieces.piece import TOUCHING_M, Solid, path_of
+from roller_env.pieces.space import held_up, inside
+from roller_env.pieces.words import InUnit, Unit, coin_groups
 from roller_env.problems import Problem
 
 _STARTS = 5
@@ -28,10 +29,11 @@ def level_warnings(level: Level, unit: Unit = "metre") -> list[Problem]:
         The doubts, without places in a file; empty for a level without any.
     """
     in_unit, everything = InUnit(unit), expand(level).at_the_start
+    around = surroundings(level, in_unit, expand(level).solids)
     return [
         *_start(level, everything, in_unit),
         *_coins(level, everything, in_unit),
-        *_plates(level, everything),
+        *(p for source, piece in level.pieces() for p in piece.doubts(path_of(source), around)),
     ]
 
 
@@ -59,12 +61,3 @@ def _coins(level: Level, everything: Sequence[Solid], in_unit: InUnit) -> Iterat
     buried = np.array(sorted(around), dtype=np.intp)
     for path, text, first in coin_groups(buried, positions, sources, in_unit):
         yield Problem(path, f"{text} inside {around[first]}; wanted in free space")
-
-
-def _plates(level: Level, everything: Sequence[Solid]) -> Iterator[Problem]:
-    static = [solid for solid in everything if is_static(solid)]
-    for index, plate in enumerate(level.plates):
-        around = burying(static, plate.at, plate.size, level.ball.radius)
-        if around:
-            message = f"the plate is wholly inside {', '.join(around)}, where nothing can strike it"
-            yield Problem(("plates", index, "at"), message)

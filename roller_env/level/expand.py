@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import weakref
 from collections import defaultdict
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from roller_env.pieces.piece import ExpandedLevel, Float64, Mover, Piece, Region, Solid
+from roller_env.pieces.coin import coin_shapes
+from roller_env.pieces.look import Shape
+from roller_env.pieces.piece import ExpandedLevel, Float64, Mover, Piece, Region, Solid, number_of
 
 if TYPE_CHECKING:
     from roller_env.level.schema import Level
@@ -37,17 +40,23 @@ def expand(level: Level) -> ExpandedLevel:
 def _expand(level: Level) -> ExpandedLevel:
     touch = level.ball.radius + TOUCH_TOLERANCE_M
     solids: list[Solid] = []
+    decks: list[Solid] = []
+    pipes: list[Solid] = []
     movers: list[Mover] = []
+    mover_kinds: list[type[Piece]] = []
     coins: list[Float64] = [np.zeros((0, 3))]
     coin_sources: list[str] = []
     regions: dict[type[Piece], list[Region]] = defaultdict(list)
     pieces: dict[type[Piece], list[Piece]] = defaultdict(list)
     for source, piece in level.pieces():
-        solids += piece.solids(source)
         pieces[type(piece)].append(piece)
+        still = list(piece.solids(source))
+        solids += still
+        (pipes if piece.is_pipe else decks).extend(solid for solid in still if solid.material)
         mover, region, own = piece.mover(source), piece.region(touch), piece.coins()
         if mover is not None:
             movers.append(mover)
+            mover_kinds.append(type(piece))
         if region is not None:
             regions[type(piece)].append(region)
         coins.append(own)
@@ -55,8 +64,18 @@ def _expand(level: Level) -> ExpandedLevel:
     return ExpandedLevel(
         solids=tuple(solids),
         movers=tuple(movers),
+        mover_kinds=tuple(mover_kinds),
+        decks=tuple(decks),
+        pipes=tuple(pipes),
         coins=np.concatenate(coins).astype(np.float64),
         coin_sources=tuple(coin_sources),
         regions={kind: tuple(found) for kind, found in regions.items()},
         pieces={kind: tuple(found) for kind, found in pieces.items()},
     )
+
+
+def shapes(level: Level) -> Iterator[Shape]:
+    """Yield what is seen of a level besides its solids: of every piece, and the coins."""
+    for source, piece in level.pieces():
+        yield from piece.looks(number_of(source))
+    yield from coin_shapes(expand(level).coins)

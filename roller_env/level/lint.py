@@ -13,12 +13,12 @@ from typing import Final
 
 import numpy as np
 
+from roller_env.level.check import surroundings
 from roller_env.level.expand import expand
 from roller_env.level.reach import Landing, Play, Reach, reach
 from roller_env.level.schema import Level
-from roller_env.level.space import is_static
-from roller_env.level.spans import EDGE, free_spans
-from roller_env.level.words import InUnit, Unit, coin_groups
+from roller_env.pieces.piece import path_of
+from roller_env.pieces.words import InUnit, Unit, coin_groups
 from roller_env.problems import Problem
 
 _DEEPER: Final = 1.1
@@ -38,13 +38,18 @@ def lint(level: Level, play: Play, unit: Unit = "metre") -> list[Problem]:
         The warnings, without places in a file.
     """
     in_unit = InUnit(unit)
-    if not any(is_static(solid) for solid in expand(level).at_the_start):
+    if not expand(level).solids:
         message = (
             "there is no floor, nothing solid that stands still; wanted floors, boxes or ramps"
         )
         return [Problem((), message)]
     found = reach(level, play)
-    problems = [*_gates(level, in_unit)]
+    around = surroundings(level, in_unit, expand(level).solids)
+    problems = [
+        problem
+        for source, piece in level.pieces()
+        for problem in piece.slow_doubts(path_of(source), around)
+    ]
     if found is not None:
         problems += [
             *_out_of_reach(level, found, in_unit),
@@ -64,45 +69,6 @@ def _out_of_reach(level: Level, found: Reach, in_unit: InUnit) -> Iterator[Probl
         yield Problem(("plates", index, "at"), f"the plate is {why}")
 
 
-def _gates(level: Level, in_unit: InUnit) -> Iterator[Problem]:
-    """Yield the gates that stand in the way of a ball on the ground also when they are open."""
-    static = [solid for solid in expand(level).at_the_start if is_static(solid)]
-    radius = level.ball.radius
-    for index, gate in enumerate(level.gates):
-        wide = math.hypot(gate.size[0], gate.size[1]) / 2 + 2.0 * radius
-        near = [solid for solid in static if _is_near(solid.centre, solid.half_size, gate.at, wide)]
-        spans = free_spans(near, radius, np.array([gate.at[:2]]))
-        if spans is None:
-            continue
-        low, high = (gate.at[k] - wide for k in (0, 1)), (gate.at[k] + wide for k in (0, 1))
-        around = spans.window(tuple(low), tuple(high))
-        around = around[spans.is_support[around] & (spans.kind[around] != EDGE)]
-        ground = spans.floor[around] - radius
-        half = gate.size[2] / 2
-        in_the_way = (ground < gate.at[2] + half) & (ground + 2 * radius > gate.at[2] - half)
-        if not in_the_way.any():
-            continue
-        # The ground on which most of it stands out.
-        level_of_it = float(np.median(ground[in_the_way]))
-        left = gate.lowers_to + half - level_of_it
-        if left < radius or gate.lowers_to - half > level_of_it + 2 * radius:
-            continue
-        found = "found" if "lowers_to" in gate.model_fields_set else "not given, so it is found"
-        yield Problem(
-            ("gates", index, "lowers_to"),
-            f"{found} {in_unit.length(gate.lowers_to)}, where the open gate still stands "
-            f"{in_unit.length(left)} over the ground; wanted at most "
-            f"{in_unit.length(level_of_it - half)}, which leaves the way free",
-        )
-
-
-def _is_near(
-    centre: tuple[float, ...], half: tuple[float, ...], at: tuple[float, ...], wide: float
-) -> bool:
-    away = math.dist(centre[:2], at[:2])
-    return away <= wide + math.hypot(*half)
-
-
 def _thin(level: Level, play: Play, found: Reach, in_unit: InUnit) -> Iterator[Problem]:
     """Yield the pieces through which the ball can fall."""
     radius = level.ball.radius
@@ -110,9 +76,8 @@ def _thin(level: Level, play: Play, found: Reach, in_unit: InUnit) -> Iterator[P
         speed = math.sqrt(2.0 * level.gravity * max(landing.drop, 0.0))
         needed = 2.0 * (_depth(landing, speed, play) - radius)
         if landing.thickness < needed:
-            kind, _, number = source.removesuffix("]").partition("[")
             yield Problem(
-                (kind, int(number)),
+                path_of(source),
                 f"the ball can fall onto it from {in_unit.length(landing.drop)} up, comes in at "
                 f"{speed:.0f} m/s and may pass through its {in_unit.length(landing.thickness)} "
                 f"in a physics step of {1000.0 * play.dt_s:.3g} ms; wanted at least "

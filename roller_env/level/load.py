@@ -28,8 +28,8 @@ from roller_env.level.lint import lint
 from roller_env.level.messages import explain
 from roller_env.level.reach import Play
 from roller_env.level.schema import Level
-from roller_env.level.words import Unit
 from roller_env.pieces.fields import METRES_PER_UNIT, SCALE_KEY
+from roller_env.pieces.words import Unit
 from roller_env.problems import Problem, listed, quoted
 from roller_env.regular_files import read_regular_file
 from roller_env.yaml_tree import MAX_BYTES, Node, YamlError, plain_tree, read_tree, uncollected

@@ -18,11 +18,12 @@ import numpy as np
 
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
-from roller_env.level.spans import EDGE, SLOPE, Bool, Indices, Spans, free_spans
 from roller_env.pieces.coin import COIN_REACH_M
-from roller_env.pieces.lift_pad import pad_groups
-from roller_env.pieces.piece import Float64, Solid
-from roller_env.pieces.plate import PLATE_HIT_HEIGHT_M, Plate
+from roller_env.pieces.finish import Finish
+from roller_env.pieces.lift_pad import LiftPad, pad_groups
+from roller_env.pieces.piece import Float64, Region, Solid
+from roller_env.pieces.plate import Plate
+from roller_env.pieces.spans import EDGE, SLOPE, Bool, Indices, Spans, free_spans
 
 _CLIMB: Final = 0.9
 """How far, in radii, the ball's centre may rise from one column to the next while it rolls: that of
@@ -153,7 +154,7 @@ class _Found(Reach):
 
 
 def _flood(level: Level, play: Play, coins: Float64, struck: Bool) -> _Found | None:
-    solids = _solids(level, struck)
+    solids, regions = _solids(level, struck), expand(level).regions
     finish = level.finish
     around = np.array([level.start.at, finish.at, *coins.tolist()])[:, :2]
     spans = free_spans(solids, level.ball.radius, around)
@@ -166,11 +167,11 @@ def _flood(level: Level, play: Play, coins: Float64, struck: Bool) -> _Found | N
     motion = flood.run()
     boxes = flood.boxes(motion)
     wide = np.full(3, COIN_REACH_M)
-    radius = level.ball.radius
+    plates, (goal,) = regions.get(Plate, ()), regions[Finish]
     return _Found(
         coins=np.array([boxes.meets(at - wide, at + wide) for at in coins], dtype=bool),
-        plates=np.array([_strikes(boxes, plate, radius) for plate in level.plates], dtype=bool),
-        finish=boxes.meets(*_grown(finish.at, finish.size, radius)),
+        plates=np.array([boxes.meets(*_corners(plate)) for plate in plates], dtype=bool),
+        finish=boxes.meets(*_corners(goal)),
         landings=flood.landings(motion, solids),
         struck=struck,
     )
@@ -178,26 +179,26 @@ def _flood(level: Level, play: Play, coins: Float64, struck: Bool) -> _Found | N
 
 def _solids(level: Level, struck: Bool) -> list[Solid]:
     """Return what is solid, with the plates that were struck down and their gates open."""
-    down = {f"plates[{index}]": level.plates[index].sinks_to for index in np.flatnonzero(struck)}
-    opened = {name for index in np.flatnonzero(struck) for name in level.plates[index].opens}
-    for index, gate in enumerate(level.gates):
-        if gate.name in opened:
-            down[f"gates[{index}]"] = gate.lowers_to
+    plates = [level.plates[index] for index in np.flatnonzero(struck)]
+    down = {name for plate in plates for name in (plate.name, *plate.sets_moving())}
+    everything = expand(level)
     return [
-        replace(solid, centre=(*solid.centre[:2], down.get(solid.source, solid.centre[2])))
-        for solid in expand(level).at_the_start
+        *everything.solids,
+        *(
+            replace(mover.solid, centre=(*mover.solid.centre[:2], mover.stop))
+            if mover.name in down
+            else mover.solid
+            for mover in everything.movers
+        ),
     ]
 
 
-def _grown(at: Sequence[float], size: Sequence[float], by: float) -> tuple[Float64, Float64]:
-    half = np.array(size) / 2 + by
-    return np.array(at) - half, np.array(at) + half
-
-
-def _strikes(boxes: _Boxes, plate: Plate, radius: float) -> bool:
-    low, high = _grown(plate.at, plate.size, radius)
-    low[2] = plate.at[2] + PLATE_HIT_HEIGHT_M
-    return boxes.meets(low, high)
+def _corners(region: Region, beside: float = 0.0) -> tuple[Float64, Float64]:
+    """Return the corners of the box that holds a region, and ``beside`` it."""
+    centre, half = np.array(region.centre), np.array(region.half) + region.radius + beside
+    low, high = centre - half, centre + half
+    low[2] = max(low[2], centre[2] + region.floor)
+    return low, high
 
 
 class _Boxes:
@@ -297,7 +298,8 @@ class _Flood:
         speed = math.sqrt(2.0 * (self._push * run + gravity * (high - float(floor.min()))))
         hop = (self._upwards(reached) * speed) ** 2 / (2.0 * gravity)
         rests, push_s = high, 0.0
-        pads = [index for index in range(len(level.lift_pads)) if self._touches(index)]
+        regions = expand(level).regions.get(LiftPad, ())
+        pads = [index for index, region in enumerate(regions) if self._touches(region)]
         if pads:
             groups = pad_groups(level.lift_pads)
             strongest: dict[int, float] = {}
@@ -310,10 +312,9 @@ class _Flood:
         rise_s = push_s + math.sqrt(2.0 * (rests + hop - high) / gravity)
         return _Motion(rests, rests + hop, speed, rise_s, self._push, gravity)
 
-    def _touches(self, pad: int) -> bool:
+    def _touches(self, pad: Region) -> bool:
         """Say whether a lift pad has been reached."""
-        piece, cell = self._level.lift_pads[pad], self._spans.cell
-        low, high = _grown(piece.at, piece.size, self._level.ball.radius + cell)
+        low, high = _corners(pad, self._spans.cell)
         near = self._spans.window(low[:2].tolist(), high[:2].tolist())
         near = near[self.away[near] == 0]
         floor = self._spans.floor[near]

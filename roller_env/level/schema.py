@@ -11,8 +11,8 @@ test holds against the numbers here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Annotated, Final, Literal, get_args, get_origin
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Any, Final, Literal, get_args, get_origin
 
 from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
@@ -36,8 +36,9 @@ from roller_env.pieces.fields import (
 from roller_env.pieces.finish import Finish
 from roller_env.pieces.floor import FloorPlan
 from roller_env.pieces.gate import Gate
+from roller_env.pieces.ground import Ground
 from roller_env.pieces.lift_pad import LiftPad
-from roller_env.pieces.piece import Piece
+from roller_env.pieces.piece import Piece, Solid
 from roller_env.pieces.plate import Plate
 from roller_env.pieces.ramp import Ramp
 from roller_env.pieces.tube import Tube
@@ -51,14 +52,16 @@ class Material(Part):
     """A surface. What the ball feels on it is the product of the ball's number and this one."""
 
     friction: Annotated[Number, Field(ge=0.0, le=10.0)] = Field(
-        1.0, description="Factor on the ball's Coulomb friction (1: the ball's own 0.30)."
+        1.0, description="Factor on the ball's friction."
     )
     elasticity: Annotated[Number, Field(ge=0.0, le=1.0)] = Field(
-        1.0, description="Factor on the ball's elasticity (1: the ball's own)."
+        1.0, description="Factor on the ball's elasticity."
     )
-    colour: Colour = Field("#8fa3b8", description="#rrggbb or #rrggbbaa.")
+    colour: Colour = Field(
+        "#8fa3b8", description='`"#rrggbb"`, or `"#rrggbbaa"` to see through it; in quotes.'
+    )
     pattern: Literal["plain", "checker", "grid"] = Field(
-        "plain", description="What is painted on it, so that motion over it can be seen."
+        "plain", description="Painted on, so that one sees motion over it."
     )
 
 
@@ -73,22 +76,23 @@ whose alpha is 60 percent in the original (`btube`)."""
 class Ball(Part):
     """The player's ball: a rigid sphere of uniform density."""
 
-    radius: PositiveLength = quants(16.0)
-    mass_kg: Annotated[Number, Field(ge=0.001, le=1_000.0)] = 1.0
+    radius: PositiveLength = Field(quants(16.0), description="Of the sphere.")
+    mass_kg: Annotated[Number, Field(ge=0.001, le=1_000.0)] = Field(1.0, description="Its mass.")
     friction: Annotated[Number, Field(ge=0.0, le=10.0)] = Field(
-        0.3, description="Coulomb coefficient against a material of friction 1."
+        0.3, description="Coulomb coefficient on a material of friction 1."
     )
     elasticity: Annotated[Number, Field(ge=0.0, le=0.95)] = Field(
-        0.0, description="Coefficient of restitution against a material of elasticity 1."
+        0.0, description="Coefficient of restitution on a material of elasticity 1."
     )
 
 
 class Start(Part):
     """Where the ball's centre is at the start of an episode."""
 
-    at: Point = Field(description="The ball's centre: one radius over what it stands on.")
+    at: Point = Field(description="The ball's **centre**: one radius over the floor it stands on.")
     jitter: tuple[NonNegativeLength, NonNegativeLength] = Field(
-        (0.0, 0.0), description="Half-widths in x and y of the uniform random offset at reset."
+        (0.0, 0.0),
+        description="The start is moved by up to this much in x and y at every reset, at random.",
     )
 
 
@@ -106,15 +110,19 @@ class Route(Part):
 class Level(Part):
     """Everything a designer wrote, in metres. Pure data: equal levels compile equally."""
 
-    name: Name = Field(description="A letter, then letters, digits, '_' or '-'.")
+    name: Name = Field(description="What it is called: a letter, then letters, digits, `_` or `-`.")
     title: Annotated[str, Field(max_length=80)] = Field("", description="What players read.")
-    description: Annotated[str, Field(max_length=2_000)] = ""
+    description: Annotated[str, Field(max_length=2_000)] = Field(
+        "", description="What it is about."
+    )
     units: Literal["metre", "quant"] = Field(
         "metre",
         description="Unit of every length written in the file; 1 quant = 0.0254 m. What is left "
-        "out keeps its default, which is stated in metres and the same in either unit.",
+        "out keeps its default, which is the same length in either unit.",
     )
-    gravity: PositiveLength = Field(quants(386.0), description="Per second squared, downwards.")
+    gravity: PositiveLength = Field(
+        quants(386.0), description="Length per second squared, downwards."
+    )
     kill_height: Length = Field(
         quants(-1129.0), description="The ball has fallen when its centre is this low."
     )
@@ -123,7 +131,8 @@ class Level(Part):
     start: Start
     finish: Finish
     materials: dict[Name, Material] = Field(
-        default_factory=dict, description="Besides 'default' and 'glass', which are built in."
+        default_factory=dict,
+        description="Surfaces by name, besides `default` and `glass`, which are built in.",
     )
     coins: tuple[Coins, ...] = ()
     floors: tuple[FloorPlan, ...] = ()
@@ -149,6 +158,16 @@ class Level(Part):
             )
         return "metre"
 
+    @field_validator("*")
+    @classmethod
+    def _pieces_stand_on_the_ground(cls, value: Any, info: ValidationInfo) -> Any:
+        """Settle pieces on those of the fields before theirs."""
+        if not isinstance(value, tuple) or not value or not isinstance(value[0], Piece):
+            return value
+        below = [piece for field in PIECE_FIELDS for piece in info.data.get(field, ())]
+        ground = Ground(lambda: _solids(below))
+        return tuple(piece.settled(ground) for piece in value)
+
     def material(self, name: str) -> Material:
         """Return the material called ``name``, the level's own before the built-in one.
 
@@ -170,6 +189,13 @@ class Level(Part):
             for index, piece in enumerate(getattr(self, field)):
                 yield f"{field}[{index}]", piece
         yield "finish", self.finish
+
+
+def _solids(pieces: Iterable[Piece]) -> list[Solid]:
+    """Return what of pieces stands still; nothing of so many that the level will be refused."""
+    if sum(piece.count().solids for piece in pieces) > MAX_PIECES:  # they could take all memory
+        return []
+    return [solid for piece in pieces for solid in piece.solids("")]
 
 
 PIECE_FIELDS: Final = {

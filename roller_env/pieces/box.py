@@ -6,19 +6,21 @@ from collections.abc import Iterator
 
 from pydantic import Field
 
-from roller_env.pieces.fields import Degrees, Name, Point, Size
+from roller_env.pieces.fields import Degrees, MaterialName, OptionalName, Point, Size
 from roller_env.pieces.piece import Piece, Solid, half_of, rotation_matrix
 
 
 class Box(Piece):
     """A solid box. Rotated about its centre: first pitch (about y), then yaw (about z)."""
 
-    at: Point = Field(description="Centre of the box.")
+    at: Point = Field(description="Its centre.")
     size: Size = Field(description="Full edge lengths along its own x, y and z.")
-    yaw_deg: Degrees = Field(0.0, description="Positive turns +x towards +y (to the left).")
-    pitch_deg: Degrees = Field(0.0, description="Positive tips the +x end down.")
-    material: str = "default"
-    name: Name | None = None
+    yaw_deg: Degrees = Field(0.0, description="Positive turns it to the left (+x towards +y).")
+    pitch_deg: Degrees = Field(
+        0.0, description="Positive tips its far (+x) end down. Pitch comes first, then yaw."
+    )
+    material: MaterialName = "default"
+    name: OptionalName = None
 
     def solids(self, source: str) -> Iterator[Solid]:
         """Yield itself."""

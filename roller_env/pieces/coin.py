@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Final, NamedTuple
 
 import numpy as np
@@ -10,9 +10,10 @@ from pydantic import ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from roller_env.arrays import Bool, Float64, Int64
-from roller_env.compiled import part
+from roller_env.compiled import device_function
 from roller_env.pieces.fields import Degrees, Part, PlanePoint, Point, PositiveLength
-from roller_env.pieces.piece import ExpandedLevel, Piece
+from roller_env.pieces.look import Paint, Shape, Spin, part
+from roller_env.pieces.piece import Count, ExpandedLevel, Piece
 from roller_env.pieces.rules import (
     FAR_M,
     After,
@@ -25,6 +26,7 @@ from roller_env.pieces.rules import (
     padded,
     show_place,
 )
+from roller_env.pieces.surfaces import Surface, full_turn, lathe
 from roller_env.pieces.sweep import ANYWHERE, POINT, bounds, meets, vector, visit
 from roller_env.units import quants
 
@@ -33,29 +35,40 @@ COIN_REACH_M: Final = quants(30.0)
 
 MAX_COINS: Final = 10_000
 
+TURNS_PER_S: Final = 0.5
+BOB_M: Final = quants(2.0)
+BOBS_PER_S: Final = 0.6
+
+_RADIUS_M: Final = quants(11.0)
+_HALF_THICKNESS_M: Final = quants(2.0)
+_DETAILED: Final = 500
+"""More coins than this are plainer, or drawing would take seconds."""
+
+_GOLD: Final = (Paint("gold/", "#ffc928", emission=0.28, specular=0.9, shininess=0.6),)
+
 
 class CoinLine(Part):
     """Coins at equal distances on a straight line, both ends included."""
 
-    start: Point
-    end: Point
-    count: Annotated[int, Field(strict=True, ge=2, le=MAX_COINS)]
+    start: Point = Field(description="The first coin.")
+    end: Point = Field(description="The last one.")
+    count: Annotated[int, Field(strict=True, ge=2, le=MAX_COINS)] = Field(description="How many.")
 
 
 class CoinArc(Part):
     """Coins at equal angles on a level arc, both ends included."""
 
-    centre: Point
-    radius: PositiveLength
-    from_deg: Degrees = Field(description="Angle of the first coin, from +x towards +y.")
+    centre: Point = Field(description="Of the circle.")
+    radius: PositiveLength = Field(description="Of the circle.")
+    from_deg: Degrees = Field(description="Angle of the first coin: 0 is +x, 90 is +y.")
     to_deg: Degrees = Field(description="Angle of the last coin.")
-    count: Annotated[int, Field(strict=True, ge=2, le=MAX_COINS)]
+    count: Annotated[int, Field(strict=True, ge=2, le=MAX_COINS)] = Field(description="How many.")
 
 
 class CoinGrid(Part):
     """Coins in level rows and columns round a centre."""
 
-    centre: Point
+    centre: Point = Field(description="Of the grid.")
     spacing: PlanePoint = Field(description="Distance between neighbours along x and y.")
     count: tuple[
         Annotated[int, Field(strict=True, ge=1, le=MAX_COINS)],
@@ -76,7 +89,7 @@ class Coins(Piece):
 
     model_config = ConfigDict(json_schema_extra={"minProperties": 1, "maxProperties": 1})
 
-    at: Point | None = None
+    at: Point | None = Field(None, description="Centre of one coin.")
     line: CoinLine | None = None
     arc: CoinArc | None = None
     grid: CoinGrid | None = None
@@ -91,6 +104,13 @@ class Coins(Piece):
                 {"given": ", ".join(given) or "none"},
             )
         return self
+
+    def count(self) -> Count:
+        """Return how many they are."""
+        if self.grid is not None:
+            return Count(0, self.grid.count[0] * self.grid.count[1])
+        row = self.line or self.arc
+        return Count(0, row.count if row is not None else 1)
 
     def coins(self) -> Float64:
         """Return them in their order."""
@@ -115,6 +135,25 @@ class Coins(Piece):
         offsets = np.stack([xs, ys, np.zeros_like(xs)], -1).reshape(-1, 3)
         rows: Float64 = np.array(grid.centre) + offsets
         return rows
+
+
+def coin_shapes(positions: Float64) -> Iterator[Shape]:
+    """Yield all coins of a level, at ``positions``, (K, 3); each turns a little later."""
+    surface = _surface(24 if len(positions) <= _DETAILED else 8)
+    for number, (x, y, z) in enumerate(positions.tolist()):
+        spin = Spin(TURNS_PER_S, BOB_M, BOBS_PER_S, 0.15 * number)
+        name = part("coin", number)
+        yield Shape(name, surface, _GOLD, at=(x, y, z), motion=spin)
+
+
+def _surface(segments: int) -> Surface:
+    """Return a coin with a raised rim, standing upright, its axis along x."""
+    radius, rim, face = _RADIUS_M, _HALF_THICKNESS_M, 0.5 * _HALF_THICKNESS_M
+    half = [(radius, 0.0), (radius, 0.7 * rim), (0.94 * radius, rim), (0.76 * radius, rim)]
+    half += [(0.70 * radius, face), (0.0, face)]
+    profile = [(r, -h) for r, h in reversed(half)] + half[1:]
+    upright = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    return lathe(profile, full_turn(segments)).moved(upright, np.zeros(3))
 
 
 # Rules --------------------------------------------------------------------------------------------
@@ -225,7 +264,7 @@ def _show(now: Seen, table: CoinTable, state: CoinState, own: Own) -> None:
             now.out[present + place] = 1.0
 
 
-@part
+@device_function
 def _keep_nearest(coin: int, new2: float, nearest: Float64, near2: Float64) -> None:
     """Put a coin into its place among the nearest, if it is one of them."""
     place = NEAREST_COINS

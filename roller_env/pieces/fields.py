@@ -72,6 +72,10 @@ Point = tuple[Length, Length, Length]
 PlanePoint = tuple[Length, Length]
 Size = tuple[PositiveLength, PositiveLength, PositiveLength]
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
+OptionalName = Annotated[
+    Name | None, Field(description="To find it by in messages; no two pieces share one.")
+]
+MaterialName = Annotated[str, Field(description="One of the level's materials.")]
 Colour = Annotated[str, Field(pattern=COLOUR_PATTERN)]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from functools import cached_property
 from typing import Annotated, Final
@@ -10,8 +11,16 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
-from roller_env.pieces.fields import Name, NonNegativeLength, Part, Point, PositiveLength
-from roller_env.pieces.piece import UNTURNED, Float64, Piece, Solid
+from roller_env.pieces.fields import (
+    MaterialName,
+    NonNegativeLength,
+    OptionalName,
+    Part,
+    Point,
+    PositiveLength,
+)
+from roller_env.pieces.piece import UNTURNED, Count, Float64, Piece, Solid
+from roller_env.problems import FieldPath
 from roller_env.units import quants
 
 MAX_PLAN_CELLS: Final = 40_000
@@ -23,10 +32,12 @@ COIN_HEIGHT_M: Final = quants(16.0)
 class FloorCell(Part):
     """What one character of a floor plan stands for."""
 
-    material: str = "default"
-    coin: bool = Field(False, strict=True, description="A coin lies on the middle of the cell.")
+    material: MaterialName = "default"
+    coin: bool = Field(
+        False, strict=True, description="Whether a coin lies on the middle of the cell."
+    )
     wall: NonNegativeLength = Field(
-        0.0, description="Height of a block standing on the cell; 0 for none."
+        0.0, description="Height of a block on the cell, 0 for none; its coin lies on the block."
     )
 
 
@@ -42,13 +53,12 @@ class FloorPlan(Piece):
     cell: PositiveLength = Field(description="Edge length of one character's square.")
     thickness: PositiveLength = Field(quants(16.0), description="Downwards from the upper face.")
     plan: Annotated[str, Field(max_length=MAX_PLAN_CELLS)] = Field(
-        description="The drawing: a block of text ('plan: |'), all rows equally long; a blank one "
-        "is empty."
+        description="The drawing: a block of text, all rows equally long; a blank one is empty."
     )
     legend: dict[str, FloorCell] = Field(
-        default_factory=dict, description="More characters, or other meanings of # and o."
+        default_factory=dict, description="More characters, or other meanings of `#` and `o`."
     )
-    name: Name | None = None
+    name: OptionalName = None
 
     @field_validator("legend")
     @classmethod
@@ -100,6 +110,18 @@ class FloorPlan(Piece):
     def cells(self) -> dict[str, FloorCell]:
         """Every character that may stand in the plan, with its meaning (``.`` left out)."""
         return {"#": FloorCell(), "o": FloorCell(coin=True), **self.legend}
+
+    def count(self) -> Count:
+        """Return the number of its slabs and blocks, and of its coins."""
+        numbers = Counter("".join(self.rows).replace(".", ""))
+        cells = [(self.cells[character], number) for character, number in numbers.items()]
+        solids = sum(number * (2 if cell.wall > 0.0 else 1) for cell, number in cells)
+        return Count(solids, sum(number * cell.coin for cell, number in cells))
+
+    def materials(self) -> Iterator[tuple[FieldPath, str]]:
+        """Yield those of the legend."""
+        for character, cell in self.legend.items():
+            yield ("legend", character, "material"), cell.material
 
     def solids(self, source: str) -> Iterator[Solid]:
         """Yield a slab for each cell, and the block that stands on it."""

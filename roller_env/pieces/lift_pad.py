@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from roller_env.arrays import Float64, Int64
-from roller_env.compiled import part
-from roller_env.pieces.fields import Name, Number, Point, Seconds, Size
+from roller_env.compiled import device_function
+from roller_env.pieces.fields import Number, OptionalName, Point, Seconds, Size
+from roller_env.pieces.look import ACTIVE, IDLE, LIGHT, Shape, part, states
 from roller_env.pieces.piece import (
     TOUCHING_M,
     UNTURNED,
@@ -18,6 +19,7 @@ from roller_env.pieces.piece import (
     Piece,
     Region,
     Solid,
+    Vector,
     half_of,
 )
 from roller_env.pieces.rules import (
@@ -33,19 +35,27 @@ from roller_env.pieces.rules import (
     place_entry,
     show_place,
 )
+from roller_env.problems import FieldPath, Problem
 from roller_env.units import quants
+
+if TYPE_CHECKING:
+    from roller_env.pieces.surroundings import Surroundings
+
+_PAINT: Final = states("pad", ("#27b5e8", 0.25), ("#8decff", 0.7))
 
 
 class LiftPad(Piece):
     """A solid pad that throws whatever enters it upwards with a steady force for a while."""
 
-    at: Point
-    size: Size
+    at: Point = Field(description="Its centre.")
+    size: Size = Field(description="Full edge lengths.")
     force_n: Annotated[Number, Field(gt=0.0, le=1e6)] = Field(
-        quants(500.0), description="Newtons upwards; more than the ball's weight."
+        quants(500.0), description="Newtons, upwards; more than the ball's weight (9.8 N)."
     )
-    duration_s: Seconds = Field(5.0, description="How long it pushes, once entered.")
-    name: Name | None = None
+    duration_s: Seconds = Field(
+        5.0, description="How long it pushes, once entered; it cannot fire again until then."
+    )
+    name: OptionalName = None
 
     def solids(self, source: str) -> Iterator[Solid]:
         """Yield itself."""
@@ -54,6 +64,31 @@ class LiftPad(Piece):
     def region(self, touch: float) -> Region:
         """Return where the ball touches it."""
         return Region(self.at, half_of(self.size), touch)
+
+    def looks(self, number: int) -> Iterator[Shape]:
+        """Yield a disc that lights up, and a column of light to rise in."""
+        x, y, z = self.at
+        radius, top = 0.42 * min(self.size[:2]), z + self.size[2] / 2
+        size, glow = (radius, quants(0.5), 0.0), (radius, quants(48.0), 0.0)
+        yield Shape(part("pad", number), "cylinder", _PAINT, size, (x, y, top))
+        at = (x, y, top + glow[1])
+        name = part("glow", number)
+        yield Shape(name, "cylinder", (LIGHT,), glow, at, seen_in=(ACTIVE,))
+
+    def phase(self, state: Any, row: int, number: int, arrived: bool) -> int:
+        """Return whether it pushes."""
+        return ACTIVE if state.of(LIFT_PAD).thrust_s[row, number] > 0.0 else IDLE
+
+    def label(self) -> tuple[str, Vector]:
+        """Return what it does."""
+        return "lift", self.at
+
+    def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield that it is too weak for the ball."""
+        if self.force_n <= around.weight_n:
+            found = f"found {self.force_n:.6g} N, which never lifts the ball"
+            wanted = f"wanted more than its weight, {around.weight_n:.6g} N"
+            yield Problem((*path, "force_n"), f"{found}; {wanted}")
 
 
 def pad_groups(pads: Sequence[LiftPad]) -> list[int]:
@@ -152,7 +187,7 @@ def _react(now: After, table: LiftPadTable, state: LiftPadState, own: Own) -> No
         now.camera.behind[now.env] |= thrust_s[pad] > 0.0
 
 
-@part
+@device_function
 def _fires(pad: int, entry: Float64, group: Int64, thrust_s: Float64) -> bool:
     """Say whether none of an entered pad's group is pushing or was entered before it."""
     for other in range(len(entry)):

@@ -5,15 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from roller_env.pieces.fields import Part
+from roller_env.problems import FieldPath, Problem
 
 if TYPE_CHECKING:
+    from roller_env.pieces.ground import Ground
+    from roller_env.pieces.look import Shape
     from roller_env.pieces.rules import Rules
+    from roller_env.pieces.surroundings import Surroundings
 
 Float64 = npt.NDArray[np.float64]
 Matrix = tuple[tuple[float, float, float], ...]
@@ -94,16 +98,40 @@ class Region(NamedTuple):
     floor: float = -math.inf
 
 
+class Count(NamedTuple):
+    """What a piece stands for, in numbers."""
+
+    solids: int = 1
+    coins: int = 0
+
+
 class Piece(Part):
     """A kind of thing of which a level has any number, each in the field of its kind.
 
     What a kind does not have it leaves as it is here: nothing.
 
     Attributes:
+        is_pipe: whether its solids are pipes, not decks: it says itself how they look, and a map
+            may be cut through them.
         rules: what the kind does in a game; None for what is only solid.
     """
 
+    is_pipe: ClassVar[bool] = False
     rules: ClassVar[Rules[Any, Any] | None] = None
+
+    def count(self) -> Count:
+        """Return how much it stands for, without making it."""
+        return Count()
+
+    def materials(self) -> Iterator[tuple[FieldPath, str]]:
+        """Yield the materials that it names, each with the field in which it does."""
+        name = getattr(self, "material", None)
+        if name is not None:
+            yield ("material",), name
+
+    def settled(self, ground: Ground) -> Self:
+        """Return it with what follows from the ground where nobody has given it."""
+        return self
 
     def solids(self, source: str) -> Iterator[Solid]:
         """Yield what of it is solid and stands still.
@@ -129,6 +157,50 @@ class Piece(Part):
         """
         return None
 
+    def sets_moving(self) -> tuple[str, ...]:
+        """Return the names of the pieces that begin to move when it has done so."""
+        return ()
+
+    def looks(self, number: int) -> Iterator[Shape]:
+        """Yield what is seen of it besides its solids and coins.
+
+        Args:
+            number: its own among those of its kind.
+        """
+        yield from ()
+
+    def phase(self, state: Any, row: int, number: int, arrived: bool) -> int:
+        """Return what it is doing: IDLE, ACTIVE or DONE of `roller_env.pieces.look`.
+
+        Args:
+            state: the games', a `roller_env.game.state.GameState`.
+            row: the game.
+            number: its own among those of its kind.
+            arrived: whether it moves and is where it stops.
+        """
+        return 0
+
+    def label(self) -> tuple[str, Vector] | None:
+        """Return what maps write beside it, and the place of it, metres."""
+        return None
+
+    def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield what is wrong with it, so that no level may have it.
+
+        Args:
+            path: its own, which those of its fields begin with.
+            around: the level around it.
+        """
+        yield from ()
+
+    def doubts(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield what it hardly can be meant to be, as `problems` does: shown at every loading."""
+        yield from ()
+
+    def slow_doubts(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield what only ``roller level check`` says, since it takes long to find."""
+        yield from ()
+
 
 PieceT = TypeVar("PieceT", bound=Piece)
 
@@ -140,6 +212,9 @@ class ExpandedLevel:
     Attributes:
         solids: what stands still.
         movers: what is solid and moves, where it is at the start.
+        mover_kinds: the kind of piece that each of them is.
+        decks: what of ``solids`` is ground, but for pipes.
+        pipes: what of them is pipes, which look otherwise and lead from deck to deck.
         coins: (K, 3) float64 centres, metres.
         coin_sources: the piece that each coin comes from, as a path such as ``coins[0]``.
         regions: where pieces act on the ball, by kind of piece.
@@ -148,6 +223,9 @@ class ExpandedLevel:
 
     solids: tuple[Solid, ...]
     movers: tuple[Mover, ...]
+    mover_kinds: tuple[type[Piece], ...]
+    decks: tuple[Solid, ...]
+    pipes: tuple[Solid, ...]
     coins: Float64
     coin_sources: tuple[str, ...]
     regions: dict[type[Piece], tuple[Region, ...]]
@@ -163,9 +241,30 @@ class ExpandedLevel:
         return tuple(solid for solid in self.solids if solid.material)
 
     @property
+    def machines(self) -> tuple[Solid, ...]:
+        """What stands still and does something: what has no material of its own."""
+        return tuple(solid for solid in self.solids if not solid.material)
+
+    def movers_of(self, kind: type[Piece]) -> list[Mover]:
+        """Return what moves of one kind of piece, in their order."""
+        return [m for m, own in zip(self.movers, self.mover_kinds, strict=True) if own is kind]
+
+    @property
     def at_the_start(self) -> tuple[Solid, ...]:
         """All that is solid, where it stands at the start."""
         return (*self.solids, *(mover.solid for mover in self.movers))
+
+
+def path_of(source: str) -> FieldPath:
+    """Return ``("floors", 0)`` for ``floors[0]``, and ``("finish",)`` for ``finish``."""
+    kind, _, number = source.removesuffix("]").partition("[")
+    return (kind, int(number)) if number else (kind,)
+
+
+def number_of(source: str) -> int:
+    """Return the number of ``floors[0]`` among those of its kind; 0 for what there is one of."""
+    _, *number = path_of(source)
+    return int(number[0]) if number else 0
 
 
 def rotation_matrix(yaw_deg: float = 0.0, pitch_deg: float = 0.0) -> Matrix:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -11,7 +11,19 @@ from pydantic import Field
 from roller_env.arrays import Bool, Float64
 from roller_env.pieces.fields import Length, Name, Point, PositiveLength, Size
 from roller_env.pieces.gate import Gate
-from roller_env.pieces.piece import UNTURNED, ExpandedLevel, Mover, Piece, Region, Solid, half_of
+from roller_env.pieces.ground import Ground, settled
+from roller_env.pieces.look import ACTIVE, DONE, IDLE, Shape, part, states
+from roller_env.pieces.piece import (
+    TOUCHING_M,
+    UNTURNED,
+    ExpandedLevel,
+    Mover,
+    Piece,
+    Region,
+    Solid,
+    Vector,
+    half_of,
+)
 from roller_env.pieces.rules import (
     After,
     Before,
@@ -25,11 +37,24 @@ from roller_env.pieces.rules import (
     place_entry,
     show_place,
 )
+from roller_env.pieces.space import burying
+from roller_env.problems import FieldPath, Problem, listed, quoted
 from roller_env.units import quants
+
+if TYPE_CHECKING:
+    from roller_env.pieces.surroundings import Surroundings
 
 PLATE_HIT_HEIGHT_M: Final = quants(25.0)
 """A plate counts a hit only while the ball's centre is higher than this over its ``at``: the
 original's guard against hits from the side."""
+
+SINKS_TO_M: Final = quants(67.0)
+"""Where the original's plate stops, whose deck has its upper face at 80 quants."""
+
+SUNK_M: Final = quants(80.0 - 67.0)
+"""How far under the face of what it stands on its centre is then."""
+
+_PAINT: Final = states("plate", ("#ffb02e", 0.25), ("#ff6a3d", 0.7), ("#35c46f", 0.3))
 
 
 class Plate(Piece):
@@ -39,21 +64,86 @@ class Plate(Piece):
     above ``at``; with the original's ball of 16 quants, build it thicker than 18 quants.
     """
 
-    name: Name
-    at: Point = Field(description="Centre of the plate before it sinks.")
-    size: Size
-    opens: tuple[str, ...] = Field(description="Names of the gates it opens.")
-    sinks_to: Length = Field(quants(67.0), description="Height of its centre when it is down.")
+    name: Name = Field(description="No two pieces share one.")
+    at: Point = Field(description="Its centre before it sinks.")
+    size: Size = Field(description="Full edge lengths.")
+    opens: tuple[str, ...] = Field(description="The names of its gates, at least one.")
+    sinks_to: Length | None = Field(
+        None,
+        description="Height of its centre when it is down. If left out, 13 quants under the upper "
+        "face of what it stands on, as in the original; if it stands on nothing, 67 quants.",
+    )
     speed: PositiveLength = Field(quants(1.6), description="Length per second, downwards.")
 
+    def settled(self, ground: Ground) -> Plate:
+        """Return it with the height at which it is down."""
+        return settled(self, "sinks_to", ground, self._solid(""), SUNK_M, SINKS_TO_M)
+
     def mover(self, source: str) -> Mover:
-        """Return the plate."""
-        solid = Solid(self.at, half_of(self.size), UNTURNED, "", source)
-        return Mover(self.name, solid, self.sinks_to, self.speed)
+        """Return the plate, which a `Level` has settled."""
+        assert self.sinks_to is not None, "a Level settles it when it is built"
+        return Mover(self.name, self._solid(source), self.sinks_to, self.speed)
+
+    def _solid(self, source: str) -> Solid:
+        return Solid(self.at, half_of(self.size), UNTURNED, "", source)
 
     def region(self, touch: float) -> Region:
         """Return where the ball touches it from above."""
         return Region(self.at, half_of(self.size), touch, PLATE_HIT_HEIGHT_M)
+
+    def looks(self, number: int) -> Iterator[Shape]:
+        """Yield a cap whose colour tells its phase."""
+        x, y, z = half_of(self.size)
+        margin = min(quants(8.0), 0.2 * min(x, y))
+        size, at = (x - margin, y - margin, quants(0.5)), (0.0, 0.0, z)
+        yield Shape(part("plate") + self.name, "box", _PAINT, size, at, carrier=self.name)
+
+    def phase(self, state: Any, row: int, number: int, arrived: bool) -> int:
+        """Return whether it sinks or is down."""
+        if state.of(PLATE).down[row, number]:
+            return DONE
+        return ACTIVE if state.of(PLATE).struck[row, number] else IDLE
+
+    def label(self) -> tuple[str, Vector]:
+        """Return its name."""
+        return self.name, self.at
+
+    def sets_moving(self) -> tuple[str, ...]:
+        """Return its gates."""
+        return self.opens
+
+    def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield gates that are not there, and why it cannot be struck or go down."""
+        yield from self._links(path, around.names.get(Gate, ()))
+        radius, length = around.ball_radius, around.in_unit.length
+        struck_at = radius + self.size[2] / 2
+        if struck_at < PLATE_HIT_HEIGHT_M + TOUCHING_M:
+            least = 2 * (PLATE_HIT_HEIGHT_M + TOUCHING_M - radius)
+            yield Problem(
+                (*path, "size", 2),
+                f"a ball on the plate is {length(struck_at)} over its centre, and only "
+                f"hits from more than {length(PLATE_HIT_HEIGHT_M)} count; "
+                f"wanted a plate at least {around.in_unit.rounded_up(least)} high",
+            )
+        yield from around.rises(self, (*path, "sinks_to"), self.mover(""))
+
+    def _links(self, path: FieldPath, gates: tuple[str, ...]) -> Iterator[Problem]:
+        none = "the level has no gates that a plate could open"
+        if not self.opens:
+            message = f"the plate opens nothing; name at least one gate of {listed(gates)}"
+            yield Problem((*path, "opens"), message if gates else none)
+        for number, name in enumerate(self.opens):
+            if name not in gates:
+                message = f"no gate is called {quoted(name)}; there are {listed(gates)}"
+                where = (*path, "opens", number)
+                yield Problem(where, message if gates else none, written=name, known=gates)
+
+    def doubts(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield what wholly hides it."""
+        hiding = burying(around.solids, self.at, self.size, around.ball_radius)
+        if hiding:
+            message = f"the plate is wholly inside {', '.join(hiding)}, where nothing can strike it"
+            yield Problem((*path, "at"), message)
 
 
 # Rules --------------------------------------------------------------------------------------------
@@ -93,7 +183,9 @@ def _table(levels: Sequence[ExpandedLevel]) -> PlateTable:
         ]
         for level, names in zip(levels, gates, strict=True)
     ]
-    stops = [[plate.sinks_to - plate.at[2] for plate in level.of(Plate)] for level in levels]
+    stops = [
+        [mover.stop - mover.solid.centre[2] for mover in level.movers_of(Plate)] for level in levels
+    ]
     return PlateTable(stop=padded(stops), opens=padded(opens, (width,)) > 0.0)
 
 

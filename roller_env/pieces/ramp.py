@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from roller_env.pieces.fields import MIN_LENGTH_M, Name, Point, PositiveLength
+from roller_env.pieces.fields import MIN_LENGTH_M, MaterialName, OptionalName, Point, PositiveLength
 from roller_env.pieces.piece import Piece, Solid, rotation_matrix
 from roller_env.units import quants
 
@@ -16,14 +16,16 @@ from roller_env.units import quants
 class Ramp(Piece):
     """A sloping slab: ``start`` and ``end`` are the ends of its upper face's centre line."""
 
-    start: Point = Field(description="Middle of the upper face's one end.")
-    end: Point = Field(description="Middle of the upper face's other end.")
-    width: PositiveLength
+    start: Point = Field(
+        description="One end of the middle line of its upper face, where the ball rolls."
+    )
+    end: Point = Field(description="The other end.")
+    width: PositiveLength = Field(description="Across that line.")
     thickness: PositiveLength = Field(
         quants(16.0), description="At right angles to the upper face, downwards."
     )
-    material: str = "default"
-    name: Name | None = None
+    material: MaterialName = "default"
+    name: OptionalName = None
 
     @model_validator(mode="after")
     def _has_run(self) -> Ramp:

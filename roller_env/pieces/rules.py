@@ -17,7 +17,7 @@ from typing import Any, Final, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from roller_env.arrays import Bool, Float32, Float64, Int64
-from roller_env.compiled import part
+from roller_env.compiled import device_function
 from roller_env.pieces.piece import ExpandedLevel
 
 FAR_M: Final = 1e12
@@ -238,7 +238,7 @@ def padded(
     return result
 
 
-@part
+@device_function
 def distance2(point: Float64, ball: Float64) -> float:
     """Return the squared distance of two places."""
     x, y, z = point[0] - ball[0], point[1] - ball[1], point[2] - ball[2]
@@ -246,7 +246,7 @@ def distance2(point: Float64, ball: Float64) -> float:
     return squared
 
 
-@part
+@device_function
 def show_place(out: Float32, begin: int, point: Float64, ball: Float64) -> None:
     """Write a place as seen from the ball."""
     for axis in range(3):

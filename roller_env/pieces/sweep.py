@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from roller_env.arrays import Float64
-from roller_env.compiled import part
+from roller_env.compiled import device_function
 
 Vector = tuple[float, float, float]
 POINT: Final[Vector] = (0.0, 0.0, 0.0)
@@ -23,7 +23,7 @@ ANYWHERE: Final = -math.inf
 """The floor of a region without one."""
 
 
-@part
+@device_function
 def time_of_fall(path: Float64, kill_height: float) -> float:
     """Return the substep time at which the ball first is at or below the kill height."""
     for step in range(len(path)):
@@ -34,13 +34,13 @@ def time_of_fall(path: Float64, kill_height: float) -> float:
     return np.inf
 
 
-@part
+@device_function
 def vector(array: Float64) -> Vector:
     """Return three numbers as what the functions here take."""
     return array[0], array[1], array[2]
 
 
-@part
+@device_function
 def bounds(path: Float64) -> tuple[Vector, Vector]:
     """Return the lowest and the highest corner of a path's bounding box."""
     x0 = x1 = path[0, 0]
@@ -54,7 +54,7 @@ def bounds(path: Float64) -> tuple[Vector, Vector]:
     return (x0, y0, z0), (x1, y1, z1)
 
 
-@part
+@device_function
 def meets(low: Vector, high: Vector, at: Vector, half: Vector, reach: float) -> bool:
     """Say whether a region's bounding box meets a path's."""
     for axis in range(3):
@@ -63,7 +63,7 @@ def meets(low: Vector, high: Vector, at: Vector, half: Vector, reach: float) -> 
     return True
 
 
-@part
+@device_function
 def visit(
     path: Float64, centre: Vector, half: Vector, radius: float, floor: float, touching: bool
 ) -> tuple[float, bool]:
@@ -88,12 +88,12 @@ def visit(
     return time, before <= 0.0
 
 
-@part
+@device_function
 def _relative(point: Float64, centre: Vector) -> Vector:
     return point[0] - centre[0], point[1] - centre[1], point[2] - centre[2]
 
 
-@part
+@device_function
 def _depth(at: Vector, half: Vector, radius: float, floor: float) -> float:
     """Return how far outside its region a point lies, negative or zero inside.
 
@@ -109,7 +109,7 @@ def _depth(at: Vector, half: Vector, radius: float, floor: float) -> float:
     return max(math.sqrt(_squared(at, POINT, half, 0.0)) - radius, floor - at[2])
 
 
-@part
+@device_function
 def _crossing(start: Vector, way: Vector, half: Vector, radius: float, floor: float) -> float:
     """Return the share, 0 to 1, of a straight piece at which it enters; ``inf`` for a miss.
 
@@ -137,7 +137,7 @@ def _crossing(start: Vector, way: Vector, half: Vector, radius: float, floor: fl
     return share
 
 
-@part
+@device_function
 def _first_within(start: Vector, way: Vector, half: Vector, reach2: float) -> float:
     """Return the share at which the squared distance to the box falls to ``reach2``, or ``inf``."""
     if _squared(start, way, half, 0.0) <= reach2:
@@ -159,7 +159,7 @@ def _first_within(start: Vector, way: Vector, half: Vector, reach2: float) -> fl
     return np.inf
 
 
-@part
+@device_function
 def _next_node(start: Vector, way: Vector, half: Vector, after: float) -> float:
     """Return the next share, at most 1, up to which the squared distance is one quadratic."""
     node = 1.0
@@ -173,7 +173,7 @@ def _next_node(start: Vector, way: Vector, half: Vector, after: float) -> float:
     return node
 
 
-@part
+@device_function
 def _squared(start: Vector, way: Vector, half: Vector, share: float) -> float:
     """Return the squared distance to the box at a share of the piece."""
     total = 0.0
@@ -183,7 +183,7 @@ def _squared(start: Vector, way: Vector, half: Vector, share: float) -> float:
     return total
 
 
-@part
+@device_function
 def _half_slope(start: Vector, way: Vector, half: Vector, share: float) -> float:
     """Return half the squared distance's derivative: never falling, linear between nodes."""
     total = 0.0

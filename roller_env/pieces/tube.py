@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -13,41 +13,60 @@ from pydantic_core import PydanticCustomError
 from roller_env.pieces.fields import (
     MIN_LENGTH_M,
     Degrees,
-    Name,
+    MaterialName,
     Number,
+    OptionalName,
     Part,
     Point,
     PositiveLength,
 )
-from roller_env.pieces.piece import Float64, Piece, Solid
+from roller_env.pieces.look import LIGHT, Paint, Run, Shape, part
+from roller_env.pieces.piece import Count, Float64, Piece, Solid
+from roller_env.pieces.surfaces import Surface, full_turn, lathe
+from roller_env.problems import FieldPath, Problem
 from roller_env.units import quants
+
+if TYPE_CHECKING:
+    from roller_env.pieces.surroundings import Surroundings
+
+
+RING_SPACING_M: Final = quants(96.0)
+"""Distance between the bands that run along a tube."""
+
+RING_SPEED_M_S: Final = quants(16.0)
+"""`btube` scrolls its texture by 16 units a second."""
+
+_COLLAR: Final = Paint("collar/", "#e9eef3", specular=0.7, shininess=0.7)
 
 
 class Opening(Part):
     """A slot along the whole length of a tube."""
 
     toward_deg: Degrees = Field(
-        description="Direction of its middle: for an upright tube the compass angle from +x to "
-        "+y; for a lying one the angle from straight up."
+        description="Where its middle looks. For an upright tube the compass angle from +x to +y: "
+        "0 is forward, 90 left, 180 back. For a lying one the angle from straight up."
     )
     width_deg: Annotated[Number, Field(gt=0.0, lt=360.0)] = Field(
-        description="Panels whose middle lies within half of this are left out."
+        description="Panels whose middle lies within half of it are left out, so that it is as "
+        "wide as whole panels."
     )
 
 
 class Tube(Piece):
     """A transparent pipe of flat panels that the ball rolls or rises inside."""
 
-    start: Point = Field(description="Middle of the pipe's one end.")
-    end: Point = Field(description="Middle of its other end.")
+    is_pipe: ClassVar[bool] = True
+
+    start: Point = Field(description="Middle of one end of the pipe.")
+    end: Point = Field(description="Middle of the other end.")
     inner_radius: PositiveLength = Field(description="From its axis to the middle of a panel.")
-    thickness: PositiveLength = quants(4.0)
+    thickness: PositiveLength = Field(quants(4.0), description="Of its wall, outwards.")
     sides: Annotated[int, Field(strict=True, ge=3, le=64)] = Field(
-        16, description="Number of flat panels around it."
+        16, description="How many flat panels it is made of."
     )
-    opening: Opening | None = None
-    material: str = "glass"
-    name: Name | None = None
+    opening: Opening | None = Field(None, description="A slot along its whole length.")
+    material: MaterialName = "glass"
+    name: OptionalName = None
 
     @model_validator(mode="after")
     def _has_length(self) -> Tube:
@@ -71,6 +90,16 @@ class Tube(Piece):
         if upright and axis[2] < 0.0:
             quarter = -quarter
         return np.stack([zero, quarter, axis], axis=1)
+
+    def count(self) -> Count:
+        """Return the number of its panels, with those that its opening leaves out."""
+        return Count(self.sides)
+
+    def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
+        """Yield that there is nothing of it."""
+        if not any(self.solids("")):
+            message = "the opening leaves no panel of the tube; wanted a smaller one"
+            yield Problem((*path, "opening"), message)
 
     def solids(self, source: str) -> Iterator[Solid]:
         """Yield the panels that the opening leaves."""
@@ -97,3 +126,49 @@ class Tube(Piece):
                 self.material,
                 source,
             )
+
+    def looks(self, number: int) -> Iterator[Shape]:
+        """Yield its wall, and of a closed tube the collars and bands of light that run along it."""
+        start, length = np.array(self.start), math.dist(self.start, self.end)
+        frame = self.frame
+        frame[:, 1] = np.cross(frame[:, 2], frame[:, 0])
+        wall = self._wall(frame, length).moved(frame, start)
+        yield Shape(part("tube", number), wall, self.material)
+        rings = int(length / RING_SPACING_M)
+        if self.opening is not None or not rings:
+            return
+        outer = (self.inner_radius + self.thickness) / math.cos(math.pi / self.sides)
+        band, collar, height = outer + quants(0.5), outer + quants(3.0), quants(5.0)
+        turn = full_turn(4 * self.sides)
+        ends = [(collar, 0.0), (collar, height), (self.inner_radius, height)]
+        ends += [(self.inner_radius, 0.0), (collar, 0.0)]
+        # Their rims stand out of the floors that the tube ends in, just enough to be seen.
+        proud = quants(0.4)
+        for end, base in enumerate((-proud, length - height + proud)):
+            rim = lathe([(radius, base + z) for radius, z in ends], turn).moved(frame, start)
+            yield Shape(part("collar", number, end), rim, (_COLLAR,))
+        surface = lathe([(band, -height), (band, height)], turn)
+        x, y, z = np.subtract(self.end, self.start).tolist()
+        rotation = tuple((float(a), float(b), float(c)) for a, b, c in frame)
+        for ring in range(rings):
+            yield Shape(
+                part("ring", number, ring),
+                surface,
+                (LIGHT,),
+                at=self.start,
+                rotation=rotation,
+                motion=Run((x, y, z), RING_SPEED_M_S, ring * (length / rings)),
+            )
+
+    def _wall(self, frame: Float64, length: float) -> Surface:
+        """Return its wall, from its start upwards, rounded where the physics has flat panels."""
+        half_angle = math.pi / self.sides
+        stretch = 1.0 / math.cos(half_angle)
+        inner, outer = self.inner_radius * stretch, (self.inner_radius + self.thickness) * stretch
+        profile = [(outer, 0.0), (outer, length), (inner, length), (inner, 0.0), (outer, 0.0)]
+        arcs = []
+        for panel in self.solids(""):
+            out = np.array(panel.rotation)[:, 0]
+            angle = math.atan2(out @ frame[:, 1], out @ frame[:, 0])
+            arcs.append(lathe(profile, np.array([angle - half_angle, angle + half_angle])))
+        return Surface.joined(arcs)

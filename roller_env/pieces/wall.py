@@ -8,7 +8,14 @@ from collections.abc import Iterator
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from roller_env.pieces.fields import MIN_LENGTH_M, Length, Name, PlanePoint, PositiveLength
+from roller_env.pieces.fields import (
+    MIN_LENGTH_M,
+    Length,
+    MaterialName,
+    OptionalName,
+    PlanePoint,
+    PositiveLength,
+)
 from roller_env.pieces.piece import UNTURNED, Piece, Solid, rotation_matrix
 from roller_env.units import quants
 
@@ -16,13 +23,15 @@ from roller_env.units import quants
 class Wall(Piece):
     """An upright slab over the line from ``start`` to ``end``."""
 
-    start: PlanePoint = Field(description="(x, y) of the one end of its middle line.")
-    end: PlanePoint = Field(description="(x, y) of the other end of its middle line.")
+    start: PlanePoint = Field(description="`[x, y]` of one end of its middle line.")
+    end: PlanePoint = Field(description="`[x, y]` of the other end.")
     bottom: Length = Field(description="Height of its lower edge.")
-    height: PositiveLength
-    thickness: PositiveLength = quants(8.0)
-    material: str = "default"
-    name: Name | None = None
+    height: PositiveLength = Field(description="Upwards from there.")
+    thickness: PositiveLength = Field(
+        quants(8.0), description="Half of it to either side of the line."
+    )
+    material: MaterialName = "default"
+    name: OptionalName = None
 
     @model_validator(mode="after")
     def _has_length(self) -> Wall:

@@ -20,21 +20,20 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.compile.mjcf import BALL, build_spec
-from roller_env.compile.scenery import SPARKS, STATES, add_scenery, part
+from roller_env.compile.scenery import add_scenery
 from roller_env.drawing.renderer import FIELD_OF_VIEW_DEG
 from roller_env.drawing.stage import SEEN_FROM_BELOW_ALPHA, Stage
 from roller_env.game.cameras import MODE_BELOW, MODE_FIRST_PERSON
 from roller_env.game.state import GameState
+from roller_env.level.expand import shapes
 from roller_env.level.schema import Level
 from roller_env.physics.presets import PhysicsPreset
+from roller_env.pieces.look import Fly, Shape, part
 from roller_env.play.effects import Light
 
 Bool = npt.NDArray[np.bool_]
 Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
-
-PUPPETS: Final = ("coin", "ring", "plate", "gate", "pad", "glow", "trigger", "band")
-"""Kinds of scenery that change while playing other than by moving with ``qpos``."""
 
 BALL_GROUP: Final = 2
 """Geom group of the ball, which is not seen in first person."""
@@ -91,9 +90,12 @@ class PlayScene:
         self._stage = Stage(level, preset)
         spec = build_spec(level, preset)
         add_scenery(spec, level)
-        puppets = _make_puppets(spec)
+        seen = list(shapes(level))
+        particles = [shape.name for shape in seen if isinstance(shape.motion, Fly)]
+        puppets = _make_puppets(spec, seen)
         _add_glass_ground(spec)
-        _delete_sparks(spec)
+        for name in particles:  # they change their size, which no body can
+            spec.delete(spec.geom(name))
         spec.geom(BALL).group = BALL_GROUP
         _set_rendering(spec, quality)
         _aim_free_camera(spec, level)
@@ -109,7 +111,7 @@ class PlayScene:
         # Compiling has moved meshes to their middles and turned them along their main axes.
         self._offsets = self.model.geom_pos[geoms].copy()
         self._turns = _matrices(self.model.geom_quat[geoms])
-        self._sparks = [stage.geom(part("spark", number)).id for number in range(SPARKS)]
+        self._sparks = [stage.geom(name).id for name in particles]
 
     def groups(self, mode: int) -> list[int]:
         """Return which geom groups of the model are seen in camera mode ``mode``, 0 or 1 each."""
@@ -171,15 +173,15 @@ def _sphere(light: Light) -> mujoco.MjvGeom:
 _UPRIGHT: Final = np.eye(3).ravel()
 
 
-def _make_puppets(spec: mujoco.MjSpec) -> list[_Puppet]:
-    """Put a puppet for every material in the place of each changing geom; return them."""
-    kinds = tuple(map(part, PUPPETS))
+def _make_puppets(spec: mujoco.MjSpec, seen: Iterable[Shape]) -> list[_Puppet]:
+    """Put a puppet for every paint in the place of each shape that changes; return them."""
     puppets = []
-    for geom in [geom for geom in spec.geoms if geom.name.startswith(kinds)]:
-        states = STATES.get(geom.name.split("/")[0])
-        materials = [f"{geom.name.split('/')[0]}/{state}" for state in states or ()]
-        for material in materials or [geom.material]:
-            puppet = _Puppet(geom.name, material)
+    for shape in seen:
+        if isinstance(shape.motion, Fly) or not (shape.motion or shape.has_phases):
+            continue
+        geom = spec.geom(shape.name)
+        for material in shape.materials:
+            puppet = _Puppet(shape.name, material)
             body = spec.worldbody.add_body(name=_puppet_name(puppet), mocap=True, pos=AWAY)
             _copy_geom(geom, body, material)
             puppets.append(puppet)
@@ -223,12 +225,6 @@ def _add_glass_ground(spec: mujoco.MjSpec) -> None:
         role = mujoco.mjtTextureRole.mjTEXROLE_RGB
         glass.textures[role] = solid.textures[role]
         _copy_geom(geom, spec.worldbody, glass.name, group=GLASS_GROUP, castshadow=False)
-
-
-def _delete_sparks(spec: mujoco.MjSpec) -> None:
-    """Take the finish's particles out: they change their size, which no body can."""
-    for geom in [geom for geom in spec.worldbody.geoms if geom.name.startswith(part("spark"))]:
-        spec.delete(geom)
 
 
 def _set_rendering(spec: mujoco.MjSpec, quality: Quality) -> None:

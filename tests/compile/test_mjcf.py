@@ -19,6 +19,7 @@ from roller_env.compile.compiled import CompiledLevel, compile_level, level_mjcf
 from roller_env.compile.mjcf import BALL, FORCE_ACTUATORS
 from roller_env.level import Level, load_level, shipped_levels
 from roller_env.physics.presets import PRESETS
+from roller_env.pieces.gate import LOWERS_TO_M
 from tests.builders import BALL_RADIUS_M, make_level, make_world, q, resting
 from tests.strategies import levels
 
@@ -238,7 +239,12 @@ def test_any_valid_levels_text_loads(level: Level) -> None:
 # Plates and gates ---------------------------------------------------------------------------------
 
 PLATE_Q = {"name": "plate", "at": q(0, 0, 72), "size": q(112, 112, 22), "opens": ["gate"]}
-GATE_Q = {"name": "gate", "at": q(400, 0, 64), "size": q(16, 128, 224)}
+GATE_Q = {
+    "name": "gate",
+    "at": q(400, 0, 64),
+    "size": q(16, 128, 224),
+    "lowers_to": LOWERS_TO_M,
+}
 FRAME_S = 1 / 60
 """The original's frame: it stops a slab at most one frame's travel below its stop."""
 

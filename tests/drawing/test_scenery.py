@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from roller_env.compile.compiled import compile_level
 from roller_env.compile.scenery import build_scenery
-from roller_env.compile.surfaces import Surface, box_surfaces, full_turn, lathe
 from roller_env.drawing.overview import View, fit_view
 from roller_env.level import Level, load_level, shipped_levels
 from roller_env.physics.presets import physics_preset
 from roller_env.pieces.piece import Solid, rotation_matrix
+from roller_env.pieces.surfaces import Surface, box_surfaces, full_turn, lathe
 from tests.strategies import levels
 
 Float64 = npt.NDArray[np.float64]

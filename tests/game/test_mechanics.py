@@ -14,9 +14,9 @@ import pytest
 from roller_env.game.step import HANGING_S, INTRO_S
 from roller_env.level import Level
 from roller_env.level.schema import Ball
-from roller_env.pieces.gate import Gate
+from roller_env.pieces.gate import LOWERS_TO_M, Gate
 from roller_env.pieces.lift_pad import LIFT_PAD, LiftPad
-from roller_env.pieces.plate import PLATE, Plate
+from roller_env.pieces.plate import PLATE, SINKS_TO_M, Plate
 from tests.builders import BALL_RADIUS_M, GRAVITY, Game, coin, make_level, q, resting
 from tests.game.rails import Rails
 
@@ -34,9 +34,9 @@ def test_the_originals_constants_are_the_defaults() -> None:
     assert (ball.radius / Q, ball.mass_kg) == pytest.approx((16.0, 1.0))
     assert (ball.friction, ball.elasticity) == (0.3, 0.0)
     plate = Plate(name="p", at=(0, 0, 2), size=(1, 1, 1), opens=("g",))
-    assert (plate.speed / Q, plate.sinks_to / Q) == pytest.approx((1.6, 67.0))
+    assert (plate.speed / Q, SINKS_TO_M / Q) == pytest.approx((1.6, 67.0))
     gate = Gate(name="g", at=(0, 0, 2), size=(1, 1, 1))
-    assert (gate.speed / Q, gate.lowers_to / Q) == pytest.approx((32.0, -32.0))
+    assert (gate.speed / Q, LOWERS_TO_M / Q) == pytest.approx((32.0, -32.0))
     pad = LiftPad(at=(0, 0, 0), size=(1, 1, 1))
     assert (pad.force_n, pad.duration_s) == pytest.approx((12.7, 5.0))
 
@@ -120,7 +120,12 @@ def test_without_the_intro_the_keys_work_at_once() -> None:
 # Plates -------------------------------------------------------------------------------------------
 
 BUTTON = {"name": "plate", "at": q(0, 0, 72), "size": q(112, 112, 22), "opens": ["gate"]}
-GATE = {"name": "gate", "at": q(400, 0, 64), "size": q(16, 128, 224)}
+GATE = {
+    "name": "gate",
+    "at": q(400, 0, 64),
+    "size": q(16, 128, 224),
+    "lowers_to": LOWERS_TO_M,
+}
 ON_PLATE = q(0, 0, 83 + 16)
 
 

@@ -30,6 +30,7 @@ from roller_env.game.observations import (
 from roller_env.game.step import observe
 from roller_env.level import load_level, shipped_levels
 from roller_env.pieces.coin import NEAREST_COINS
+from roller_env.pieces.gate import LOWERS_TO_M
 from tests.builders import BALL_RADIUS_M, Game, coin, make_level, q, resting
 from tests.game.rails import Rails
 
@@ -175,7 +176,9 @@ def machine_game() -> Game:
             {"name": "here", "at": q(0, 0, 72), "size": q(112, 112, 22), "opens": ["gate"]},
             {"name": "there", "at": q(0, 400, 72), "size": q(112, 112, 22), "opens": ["gate"]},
         ],
-        gates=[{"name": "gate", "at": q(400, 0, 64), "size": q(16, 128, 224)}],
+        gates=[
+            {"name": "gate", "at": q(400, 0, 64), "size": q(16, 128, 224), "lowers_to": LOWERS_TO_M}
+        ],
         lift_pads=[{"at": q(-300, 0, 2), "size": q(72, 72, 4)}],
     )
     return Game(level)

@@ -183,11 +183,15 @@ def test_plates_and_gates_only_sink() -> None:
     assert found == [("plates", 0, "sinks_to"), ("gates", 0, "lowers_to")]
 
 
-def test_an_original_height_that_does_not_fit_is_named_as_such() -> None:
+def test_a_height_that_follows_from_the_ground_and_lies_too_high_is_told_with_the_ground() -> None:
     plate = {key: value for key, value in PLATE.items() if key != "sinks_to"} | {"opens": ["gate"]}
-    text = message(plates=[plate], gates=[GATE])
-    assert text == (
-        "plates[0].sinks_to: not given, so it is the original's 1.7018 metres; "
+    sunk = plate | {"at": (3.0, 0.0, -0.35), "size": (1.0, 1.0, 0.8)}
+    assert message(plates=[sunk], gates=[GATE]) == (
+        "plates[0].sinks_to: not given, so on ground at 0 metres it is -0.3302 metres; "
+        "wanted at most the height of 'at', -0.35 metres"
+    )
+    assert message(plates=[plate | {"at": (3.0, 9.0, 0.25)}], gates=[GATE]) == (
+        "plates[0].sinks_to: not given, and it stands on nothing that would tell it; "
         "wanted at most the height of 'at', 0.25 metres"
     )
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from roller_env.level import LevelError, level_json_schema, parse_level
+from scripts import level_tables
 
 DOCS = Path(__file__).parents[2] / "docs" / "levels.md"
 TEXT = DOCS.read_text(encoding="utf-8")
@@ -69,8 +70,33 @@ def test_the_python_examples_run(tmp_path: Path) -> None:
     assert run.stdout.split() == ["hello", "plank"]
 
 
-def test_every_field_of_every_piece_is_on_the_page() -> None:
-    schema = level_json_schema()
-    pieces = {"Level": schema, **schema["$defs"]}
-    fields = {field for piece in pieces.values() for field in piece["properties"]}
-    assert {field for field in fields if f"`{field}`" not in TEXT} == set()
+def test_the_tables_are_what_the_models_say() -> None:
+    assert level_tables.written(TEXT) == TEXT, "run scripts/level_tables.py"
+
+
+def test_every_model_of_a_level_has_a_table() -> None:
+    wanted = {"Level", *level_json_schema()["$defs"]}
+    assert level_tables.tables(TEXT) == wanted, "add a table of it, and run scripts/level_tables.py"
+
+
+def test_every_field_is_described() -> None:
+    for name in level_tables.tables(TEXT):
+        for line in level_tables.table(name).split("\n")[3:]:
+            assert not line.endswith("|  |"), f"{name}: {line}"
+
+
+def test_the_script_writes_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = tmp_path / "levels.md"
+    page.write_text(TEXT.replace("| needed |", "| |"), encoding="utf-8")
+    monkeypatch.setattr(level_tables, "PAGE", page)
+    level_tables.main()
+    assert page.read_text(encoding="utf-8") == TEXT
+
+
+def test_the_worked_example_of_a_piece_is_its_module() -> None:
+    root = DOCS.parents[1]
+    section = (root / "CONTRIBUTING.md").read_text(encoding="utf-8").split("## Adding a piece")[1]
+    module = (root / "roller_env" / "pieces" / "lift_pad.py").read_text(encoding="utf-8")
+    code = {line.strip() for line in module.splitlines()}
+    shown = "".join(re.findall(r"```python\n(.*?)```", section.split("\n## ")[0], re.DOTALL))
+    assert {line.strip() for line in shown.splitlines()} - code == {"..."}

@@ -8,11 +8,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from roller_env.compile.scenery import part
-from roller_env.drawing.stage import SPARK_LIFE_S, Stage
+from roller_env.drawing.stage import Stage
 from roller_env.game.cameras import MODE_BEHIND, MODE_BELOW, MODE_FIRST_PERSON, MODES
 from roller_env.level import Level, load_level, shipped_levels
 from roller_env.physics.presets import PRESETS
+from roller_env.pieces.finish import SPARK_LIFE_S
+from roller_env.pieces.look import part
 from roller_env.play.effects import Light
 from roller_env.play.scene import AWAY, BALL_GROUP, GLASS_GROUP, GROUND_GROUP, PlayScene
 from roller_env.simulation import Simulation

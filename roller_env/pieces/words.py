@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.pieces.fields import METRES_PER_UNIT
-from roller_env.pieces.piece import Float64
+from roller_env.pieces.piece import Float64, path_of
 from roller_env.problems import FieldPath
 
 Unit = Literal["metre", "quant"]
@@ -48,7 +48,6 @@ def coin_groups(
     for index in indices.tolist():
         groups.setdefault(sources[index], []).append(index)
     for source, members in groups.items():
-        kind, _, number = source.removesuffix("]").partition("[")
         where = in_unit.point(positions[members[0]].tolist())
         others = f" (the first of {len(members)})" if len(members) > 1 else ""
-        yield (kind, int(number)), f"the coin at {where}{others} is", members[0]
+        yield path_of(source), f"the coin at {where}{others} is", members[0]

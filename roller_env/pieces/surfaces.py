@@ -7,17 +7,15 @@ anew on each one, so a floor of several boxes would show its seams.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
-import mujoco
 import numpy as np
 import numpy.typing as npt
 
 from roller_env.pieces.piece import Solid
-from roller_env.pieces.tube import Tube
 from roller_env.units import quants
 
 Float64 = npt.NDArray[np.float64]
@@ -62,18 +60,6 @@ class Surface:
             self.normals @ rotation.T,
             self.texture,
             self.faces,
-        )
-
-    def add_to(self, spec: mujoco.MjSpec, name: str) -> None:
-        """Add the surface to ``spec`` as the mesh ``name``."""
-        spec.add_mesh(
-            name=name,
-            # Surfaces need not enclose anything, and nothing here has mass.
-            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
-            uservert=self.vertices.ravel(),
-            usernormal=self.normals.ravel(),
-            usertexcoord=self.texture.ravel(),
-            userface=self.faces.ravel().astype(np.int32),
         )
 
 
@@ -150,19 +136,3 @@ def lathe(profile: Sequence[tuple[float, float]], angles: Float64) -> Surface:
 def full_turn(segments: int) -> Float64:
     """Return the angles of a closed ring, radians."""
     return np.linspace(0.0, 2.0 * math.pi, segments + 1)
-
-
-def tube_surface(tube: Tube, panels: Iterable[Solid]) -> Surface:
-    """Return a tube's wall, rounded where the physics has the flat ``panels``."""
-    length, stretch = math.dist(tube.start, tube.end), 1.0 / math.cos(math.pi / tube.sides)
-    inner, outer = tube.inner_radius * stretch, (tube.inner_radius + tube.thickness) * stretch
-    profile = [(outer, 0.0), (outer, length), (inner, length), (inner, 0.0), (outer, 0.0)]
-    frame = tube.frame
-    frame[:, 1] = np.cross(frame[:, 2], frame[:, 0])
-    half_angle = math.pi / tube.sides
-    arcs = []
-    for panel in panels:
-        out = np.array(panel.rotation)[:, 0]
-        angle = math.atan2(out @ frame[:, 1], out @ frame[:, 0])
-        arcs.append(lathe(profile, np.array([angle - half_angle, angle + half_angle])))
-    return Surface.joined(arcs).moved(frame, np.array(tube.start))

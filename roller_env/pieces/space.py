@@ -1,4 +1,4 @@
-"""What is where in a level at the start: which solids hold a point, and which hold up the ball."""
+"""What is where: which solids hold a point, and which hold up the ball."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.level.schema import Level
 from roller_env.pieces.piece import TOUCHING_M, Float64, Solid
 
 Bool = npt.NDArray[np.bool_]
@@ -23,11 +22,6 @@ _RING_SHARE: Final = 0.9
 out, in radii."""
 
 
-def is_static(solid: Solid) -> bool:
-    """Say whether it stands still: whether it is no plate and no gate."""
-    return not solid.source.startswith(("plates", "gates"))
-
-
 def samples(half: float, step: float, most: int = MAX_SAMPLES) -> Float64:
     """Return an odd number of places from -half to half, ``step`` or less apart if ``most`` allow.
 
@@ -37,15 +31,6 @@ def samples(half: float, step: float, most: int = MAX_SAMPLES) -> Float64:
         return np.zeros(1)
     each = min(int(np.ceil(half / step)), most // 2)
     return np.linspace(-half, half, 1 + 2 * each)
-
-
-def starts(level: Level, most: int = MAX_SAMPLES) -> Float64:
-    """Return places, (n, 3) metres, where the ball may start, a radius apart if ``most`` allow."""
-    x, y = (samples(half, level.ball.radius, most) for half in level.start.jitter)
-    xs, ys = np.meshgrid(x, y, indexing="ij")
-    offsets = np.stack([xs, ys, np.zeros_like(xs)], axis=-1).reshape(-1, 3)
-    places: Float64 = np.array(level.start.at) + offsets
-    return places
 
 
 def inside(
