@@ -15,7 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from roller_env.arrays import Bool, Float32, Float64, Int64
-from roller_env.compiled import compiled_with_packages, inlined
+from roller_env.compiled import compiled_with_packages, device_function, inlined
 from roller_env.game.bodies import Columns
 from roller_env.game.cameras import settle
 from roller_env.game.kinds import all_hooks
@@ -57,6 +57,7 @@ class Step(NamedTuple):
         inside: (N, R) which regions it is in at the end.
         end: (N,) physics steps until the finish or the fall; ``inf`` if neither, -``inf`` where the
             step does not count.
+        fell: (N,) whether the ball fell, be the game over or not.
         coins: (N, 1) how many coins were collected.
         terms: (N, terms) what the step has earned, by `roller_env.game.rewards.TERMS`.
         reward: (N,) their sum.
@@ -67,6 +68,7 @@ class Step(NamedTuple):
     entry: Float64
     inside: Bool
     end: Float64
+    fell: Bool
     coins: Int64
     terms: Float64
     reward: Float64
@@ -122,11 +124,14 @@ class Concluding(NamedTuple):
         regions: of the levels.
         routes: of the levels.
         kill_height: (L,) of the levels.
+        comes_back: (L,) of the levels: whether a fall does not end the game.
+        start: (L, 3) of the levels.
         tables: of the kinds, by level.
         owns: (kinds, 5) their `Own`s.
         state: written.
         max_steps: (N,) control steps after which an episode is cut off.
         hanging_s: (N,) from `prepare`.
+        back_at: (N, 3) where a ball that has fallen is put.
         step: written.
     """
 
@@ -134,11 +139,14 @@ class Concluding(NamedTuple):
     regions: Regions
     routes: Routes
     kill_height: Float64
+    comes_back: Bool
+    start: Float64
     tables: tuple[Any, ...]
     owns: Int64
     state: GameState
     max_steps: Int64
     hanging_s: Float64
+    back_at: Float64
     step: Step
 
 
@@ -196,6 +204,7 @@ class Games:
             entry=np.full((num_envs, regions), np.inf),
             inside=flags(regions),
             end=np.full(num_envs, np.inf),
+            fell=flags(),
             coins=np.zeros((num_envs, 1), dtype=np.int64),
             terms=np.zeros((num_envs, len(TERMS))),
             reward=np.zeros(num_envs),
@@ -217,11 +226,14 @@ class Games:
             levels.regions,
             levels.routes,
             levels.kill_height,
+            levels.comes_back,
+            levels.start,
             levels.kinds,
             levels.owns,
             state,
             max_steps,
             self.hanging_s,
+            np.zeros((num_envs, 3)),
             self.step,
         )
         self.showing = Showing(
@@ -293,7 +305,8 @@ def conclude(
     """Draw the consequences of a step in some envs, and say what it was worth.
 
     Events are found for the game as it stood when the step began, and what lies behind its end did
-    not happen. Where the physics diverged, or the ball hung still, nothing did.
+    not happen. Where the physics diverged, or the ball hung still, nothing did. A ball that falls
+    where falls do not end the game is put back.
 
     Args:
         games: all of them.
@@ -301,7 +314,7 @@ def conclude(
         duration_s: of the step.
         path: (n, S + 1, p) where they were before the first physics step and after each; their
             balls' centres among it.
-        physics: (N, width) the state of the physics now.
+        physics: (N, width) the state of the physics now; a ball put back is written there.
         at: where everything is in both.
         rewarding: what it is worth.
     """
@@ -312,10 +325,13 @@ def conclude(
         _find_events(games, level, env, duration_s, way)
         state.steps[env] += 1
         state.control_delay_s[env] = max(state.control_delay_s[env] - duration_s, 0.0)
+        returns = step.fell[env] and not state.fallen[env]
         step.coins[env, 0] = 0
         step.camera.trigger[env] = -1
         step.camera.overhead[env] = False
-        step.camera.behind[env] = False
+        step.camera.behind[env] = returns
+        for axis in range(3):
+            games.back_at[env, axis] = games.start[level, axis]
         now = After(
             level,
             env,
@@ -328,14 +344,20 @@ def conclude(
             step.coins[env],
             state.signals[env],
             step.camera,
+            returns,
+            games.back_at[env],
         )
         _react(now, games.tables, state.kinds, games.owns)
         settle(env, duration_s, way[-1, 0], step.camera, state.camera)
         for region in range(state.touching.shape[1]):
-            state.touching[env, region] = step.inside[env, region]
+            state.touching[env, region] = step.inside[env, region] and not returns
         over = state.finished[env] or state.fallen[env] or state.diverged[env]
         state.truncated[env] = not over and state.steps[env] >= games.max_steps[env]
-        _pay(games, level, env, way[-1], over, rewarding)
+        if returns:
+            _put_back(physics[env], at, games.back_at[env])
+            _pay(games, level, env, games.back_at[env], over, rewarding)
+        else:
+            _pay(games, level, env, way[-1], over, rewarding)
 
 
 @inlined
@@ -349,6 +371,7 @@ def _find_events(games: Concluding, level: int, env: int, duration_s: float, pat
         live[region] = True
     if state.diverged[env] or games.hanging_s[env] > duration_s - 1e-9:
         step.end[env] = -np.inf
+        step.fell[env] = False
         return
     _notice(Noticed(level, env, live), games.tables, state.kinds, games.owns)
     low, high = bounds(path)
@@ -365,10 +388,28 @@ def _find_events(games: Concluding, level: int, env: int, duration_s: float, pat
     end = min(finish, fall)
     step.end[env] = end
     state.finished[env] |= finish < np.inf and finish <= fall
-    state.fallen[env] |= fall < finish
+    step.fell[env] = fall < finish
+    state.fallen[env] |= step.fell[env] and not games.comes_back[level]
     for region in range(len(entry)):
         if entry[region] > end:
             entry[region] = np.inf
+
+
+@device_function
+def _put_back(body: Float64, at: Columns, place: Float64) -> None:
+    """Put a ball that has fallen somewhere, at rest and as it was turned at the start.
+
+    Args:
+        body: row of the physics' state.
+        at: where everything is in it.
+        place: (3,) for its centre.
+    """
+    for axis in range(3):
+        body[at.position + axis] = place[axis]
+        body[at.velocity + axis] = 0.0
+        body[at.angular_velocity + axis] = 0.0
+        body[at.orientation + 1 + axis] = 0.0
+    body[at.orientation] = 1.0
 
 
 @inlined
@@ -380,7 +421,7 @@ def _pay(
     counts = games.step.end[env] > -np.inf
     terms[_COIN] = weights[_COIN] * games.step.coins[env, 0]
     terms[_FINISH] = weights[_FINISH] * (counts and state.finished[env])
-    terms[_FALL] = weights[_FALL] * (counts and state.fallen[env])
+    terms[_FALL] = weights[_FALL] * games.step.fell[env]
     total = terms[_COIN] + terms[_FINISH] + terms[_FALL]
     if rewarding.shaped:
         before = state.shaping.potential[env]

@@ -67,6 +67,7 @@ class LevelTable(NamedTuple):
     routes: Routes
     gate_count: Int64  # (L,)
     kill_height: Float64  # (L,)
+    comes_back: Bool  # (L,) whether a fall does not end the game
     time_limit_s: Float64  # (L,)
     start: Float64  # (L, 3)
     jitter: Float64  # (L, 2)
@@ -116,6 +117,7 @@ class LevelTable(NamedTuple):
             ),
             gate_count=np.array([len(level.gates) for level in levels]),
             kill_height=np.array([level.kill_height for level in levels]),
+            comes_back=np.array([level.falls == "checkpoint" for level in levels]),
             time_limit_s=np.array([level.time_limit_s for level in levels]),
             start=np.array([level.start.at for level in levels]),
             jitter=np.array([level.start.jitter for level in levels]),

@@ -19,6 +19,7 @@ from pydantic_core import PydanticCustomError
 
 from roller_env.pieces.box import Box
 from roller_env.pieces.camera_trigger import CameraTrigger
+from roller_env.pieces.checkpoint import Checkpoint
 from roller_env.pieces.coin import Coins
 from roller_env.pieces.fields import (
     METRES_PER_UNIT,
@@ -126,6 +127,11 @@ class Level(Part):
     kill_height: Length = Field(
         quants(-1129.0), description="The ball has fallen when its centre is this low."
     )
+    falls: Literal["end", "checkpoint"] = Field(
+        "end",
+        description="What a fall does: `end` the episode, or let the ball go on from the last "
+        "`checkpoint` that it touched.",
+    )
     time_limit_s: Seconds = Field(120.0, description="An episode ends after this long.")
     ball: Ball = Ball()
     start: Start
@@ -144,6 +150,7 @@ class Level(Part):
     gates: tuple[Gate, ...] = ()
     lift_pads: tuple[LiftPad, ...] = ()
     camera_triggers: tuple[CameraTrigger, ...] = ()
+    checkpoints: tuple[Checkpoint, ...] = ()
     route: Route | None = None
 
     @field_validator("units")

@@ -177,7 +177,9 @@ def _react(now: After, table: LiftPadTable, state: LiftPadState, own: Own) -> No
             thrust_s[pad] = -1.0  # until those behind it have been asked
     for pad in range(own.regions):
         left = thrust_s[pad]
-        if left < 0.0:
+        if now.returns:
+            thrust_s[pad] = 0.0
+        elif left < 0.0:
             thrust_s[pad] = table.duration_s[now.level, pad]
         else:
             left -= now.duration_s

@@ -113,6 +113,8 @@ class After(NamedTuple):
         coins: (1,) to add to: how many coins the step has earned.
         signals: (G,) to set: which gates are told to open.
         camera: what the pieces ask of it.
+        returns: whether the ball has fallen and is put back at the end of the step.
+        back_at: (3,) to set: where its centre is put then; the level's start so far. Metres.
     """
 
     level: int
@@ -126,6 +128,8 @@ class After(NamedTuple):
     coins: Int64
     signals: Bool
     camera: CameraAsked
+    returns: bool
+    back_at: Float64
 
 
 class Seen(NamedTuple):
