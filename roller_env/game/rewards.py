@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from roller_env import checks
 from roller_env.compiled import compiled
+from roller_env.game.result import REWARD_TERMS
 from roller_env.game.state import GameState
 from roller_env.game.sweep import Events
 from roller_env.game.tables import LevelTable
@@ -45,33 +46,59 @@ class RewardWeights:
             object.__setattr__(self, name, value)
 
 
-def points_reward(events: Events, weights: RewardWeights) -> Float64:
-    """Return the points, (N,), of a step's events: coins, finish, fall."""
-    points = np.empty(len(events.points))
-    _add_up(
+def event_terms(events: Events, weights: RewardWeights) -> Float64:
+    """Return what a step's events are worth, (N, 4) by `REWARD_TERMS`; the progress is left 0."""
+    terms = np.zeros((len(events.points), len(REWARD_TERMS)))
+    _weigh(
         weights.coin,
         weights.finish,
         weights.fall,
         events.points,
         events.finished,
         events.fallen,
-        points,
+        terms,
     )
-    return points
+    return terms
 
 
 @compiled
-def _add_up(
+def _weigh(
     coin: float,
     finish: float,
     fall: float,
     coins: Int64,
     finished: Bool,
     fallen: Bool,
-    points: Float64,
+    terms: Float64,
 ) -> None:
-    for row in range(len(points)):
-        points[row] = coin * coins[row] + finish * finished[row] + fall * fallen[row]
+    for row in range(len(terms)):
+        terms[row, 0] = coin * coins[row]
+        terms[row, 1] = finish * finished[row]
+        terms[row, 2] = fall * fallen[row]
+
+
+def add_up(terms: Float64, total_reward: Float64, reward_terms: Float64) -> Float64:
+    """Return a step's rewards, (N,): its terms, (N, 4), added up in their order.
+
+    Args:
+        terms: the step's.
+        total_reward: (N,) of the episodes so far; the step's are added.
+        reward_terms: (N, 4) likewise.
+    """
+    reward = np.empty(len(terms))
+    _add_up(terms, total_reward, reward_terms, reward)
+    return reward
+
+
+@compiled
+def _add_up(terms: Float64, total_reward: Float64, reward_terms: Float64, reward: Float64) -> None:
+    for row in range(len(terms)):
+        reward[row] = terms[row, 0]
+        for term in range(1, terms.shape[1]):
+            reward[row] += terms[row, term]
+        total_reward[row] += reward[row]
+        for term in range(terms.shape[1]):
+            reward_terms[row, term] += terms[row, term]
 
 
 def follow_route(state: GameState, table: LevelTable, ball: Float64) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.game.cameras import OVERHEAD_WAITS
+from roller_env.game.result import REWARD_TERMS
 from roller_env.game.tables import Kind, LevelTable
 
 Float64 = npt.NDArray[np.float64]
@@ -44,6 +45,8 @@ class GameState:
         fallen: (N,) the ball has fallen below the kill height.
         diverged: (N,) the physics failed.
         truncated: (N,) the time is up.
+        total_reward: (N,) sum of the rewards since the episode began.
+        reward_terms: (N, 4) of which sums that is one: of each of `REWARD_TERMS`.
     """
 
     steps: Int64
@@ -64,6 +67,8 @@ class GameState:
     fallen: Bool
     diverged: Bool
     truncated: Bool
+    total_reward: Float64
+    reward_terms: Float64
 
     @staticmethod
     def initial(table: LevelTable) -> GameState:
@@ -93,6 +98,8 @@ class GameState:
             fallen=flags(),
             diverged=flags(),
             truncated=flags(),
+            total_reward=np.zeros(n),
+            reward_terms=np.zeros((n, len(REWARD_TERMS))),
         )
 
     @property

@@ -19,7 +19,7 @@ from roller_env.play import panels
 from roller_env.play.app import Choices, GamePlugin, SceneEvent, ScreenPlugin
 from roller_env.play.panels import Choice, Wish
 from roller_env.play.scene import Quality
-from roller_env.play.session import GameFrame, GameSession, Phase, Result
+from roller_env.play.session import GameFrame, GameSession, Phase
 from roller_env.play.sound import CoinSound
 from roller_env.replay import Playback, Replay
 
@@ -129,7 +129,6 @@ class ReplaySession:
     def frame(self) -> GameFrame:
         """Return what is to be drawn now."""
         simulation = self._playback.simulation
-        results = {k: v[0].item() for k, v in simulation.results(np.array([0])).items()}
         step_s = simulation.duration_s
         return GameFrame(
             level=self.compiled.level,
@@ -143,11 +142,8 @@ class ReplaySession:
             ball=self.compiled.ball_qpos,
             state=GameState(**simulation.state.copy_rows()),
             clock_s=self._scenery_s,
-            result=Result(
-                truncated=bool(simulation.state.truncated[0]),
-                coins_in_level=int(simulation.table.coin_count[0]),
-                **results,
-            ),
+            result=simulation.result(),
+            coins_in_level=int(simulation.table.coin_count[0]),
             control_in_s=float(simulation.state.control_delay_s[0]),
             falls=0,
             agent=False,

@@ -7,7 +7,7 @@ import platform
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib.metadata import version
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ from roller_env import __version__
 from roller_env.config import EnvConfig, make_config
 from roller_env.game.actions import ActionMode, forces
 from roller_env.game.observations import ObservationMode
+from roller_env.game.result import EpisodeResult
 from roller_env.game.rewards import RewardMode, RewardWeights
 from roller_env.game.version import RULES_VERSION
 from roller_env.level import Level
@@ -156,41 +157,6 @@ class Options(_Frozen):
         return {name: getattr(self, name) for name in Options.model_fields}
 
 
-class Result(_Frozen):
-    """How an episode ended, or stood when its recording did.
-
-    Attributes:
-        success: at the finish.
-        fall: below the kill height.
-        diverged: the physics failed.
-        truncated: the time was up.
-        coins: collected.
-        score_percent: of the level's coins.
-        time_s: played.
-        total_reward: undiscounted sum, with the replay's reward options.
-    """
-
-    success: bool
-    fall: bool
-    diverged: bool
-    truncated: bool
-    coins: Count
-    score_percent: Number
-    time_s: Number
-    total_reward: Number
-
-    @property
-    def outcome(self) -> Literal["finish", "fall", "diverged", "time limit", "not ended"]:
-        """The end in a word or two."""
-        if self.success:
-            return "finish"
-        if self.fall:
-            return "fall"
-        if self.diverged:
-            return "diverged"
-        return "time limit" if self.truncated else "not ended"
-
-
 @dataclass(frozen=True, eq=False)
 class Replay:
     """One episode from its start, by what it depends on; all else is computed again from that.
@@ -216,7 +182,7 @@ class Replay:
     intro: bool
     actions: Actions
     checksums: Checksums
-    result: Result
+    result: EpisodeResult
     versions: Versions
     player: str = ""
     seed: int | None = None

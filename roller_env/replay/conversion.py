@@ -11,12 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.config import EnvConfig, make_config
+from roller_env.game.result import EpisodeResult
 from roller_env.level import Level
 from roller_env.replay.actions import actions_of
-from roller_env.replay.contents import Options, Replay, Result, check_game
+from roller_env.replay.contents import Options, Replay, check_game
 from roller_env.replay.errors import ReplayError
 from roller_env.replay.file import Header, Header2, read_whole, replay_of, unpack
-from roller_env.replay.recorder import replays_of
+from roller_env.replay.recorder import Recorder, place_at_starts
+from roller_env.simulation import Simulation
 
 Float64 = npt.NDArray[np.float64]
 
@@ -37,7 +39,7 @@ class Format1:
     start: tuple[float, float, float]
     intro: bool
     force_n: Float64
-    result: Result
+    result: EpisodeResult
     player: str
     seed: int | None
 
@@ -96,14 +98,14 @@ def record_anew(played: Replay | Format1, config: EnvConfig | None = None) -> Re
     if config is None:
         config = make_config(level=played.level, num_threads=1, **played.options.keywords())
     actions_of(config.action, played.force_n)
-    (replay,) = replays_of(
-        config,
-        np.array([played.start]),
-        [played.force_n],
-        player=played.player,
-        seeds=[played.seed],
-        intro=played.intro,
-    )
+    simulation = Simulation(config)
+    place_at_starts(simulation, np.array([played.start]), played.intro)
+    recorder = Recorder(simulation, played.player)
+    recorder.begin(seed=played.seed)
+    for force in played.force_n[:, None]:
+        simulation.step(force)
+        recorder.record(force)
+    replay = recorder.replay()
     if replay.result != played.result:
         raise ReplayError(
             f"the game on record ended in {_told(played.result)}; played again here, it ends in "
@@ -112,7 +114,7 @@ def record_anew(played: Replay | Format1, config: EnvConfig | None = None) -> Re
     return replay
 
 
-def _told(result: Result) -> str:
+def _told(result: EpisodeResult) -> str:
     return (
         f"{result.outcome!r} after {result.time_s:.2f} s with {result.coins} coins and a reward of "
         f"{result.total_reward:g}"

@@ -20,14 +20,17 @@ import hashlib
 import os
 import zlib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import from_json
 
+from roller_env import checks
 from roller_env.assets import asset_directory
+from roller_env.game.result import EpisodeResult
 from roller_env.level import Level, LevelError, load_level
 from roller_env.regular_files import read_regular_file
 from roller_env.replay.actions import (
@@ -44,7 +47,6 @@ from roller_env.replay.contents import (
     Number,
     Options,
     Replay,
-    Result,
     Text,
     Versions,
 )
@@ -53,6 +55,7 @@ from roller_env.replay.errors import ReplayError
 SUFFIX: Final = ".replay"
 
 MAX_HEADER_BYTES: Final = 2**14
+MAX_COINS: Final = 2**31 - 1
 MAX_LEVEL_BYTES: Final = 2**22
 """A level file may have a quarter of this; with its defaults written out it grows."""
 
@@ -67,6 +70,21 @@ _MAX_BYTES: Final = (
 
 _GZIP: Final = 16 + zlib.MAX_WBITS
 _KIND: Final = "roller-replay"
+_NOT_WRITTEN: Final = {"result": {"reward_terms"}}
+"""Played again, the game tells it."""
+
+
+def _possible(result: EpisodeResult) -> EpisodeResult:
+    """Refuse a result of which no game can be."""
+    checks.whole("coins", result.coins, 0, MAX_COINS)
+    for name in ("score_percent", "time_s", "total_reward"):
+        checks.number(name, getattr(result, name))
+    if result.reward_terms is not None:
+        raise ValueError("reward_terms: found some; a file has only their sum")
+    return result
+
+
+RecordedResult = Annotated[EpisodeResult, AfterValidator(_possible)]
 
 
 class Header(BaseModel):
@@ -81,7 +99,7 @@ class Header(BaseModel):
     start: tuple[Number, Number, Number]
     intro: bool
     steps: Annotated[int, Field(ge=0, le=MAX_STEPS)]
-    result: Result
+    result: RecordedResult
     options: Options
     level_bytes: Annotated[int, Field(ge=2, le=MAX_LEVEL_BYTES)]
     level_sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
@@ -192,7 +210,7 @@ def encode(replay: Replay) -> bytes:
         start=replay.start,
         intro=replay.intro,
         steps=len(replay),
-        result=replay.result,
+        result=replace(replay.result, reward_terms=None),
         options=replay.options,
         versions=replay.versions,
         encoding=encoding_of(replay.actions),
@@ -203,7 +221,7 @@ def encode(replay: Replay) -> bytes:
     )
     content = b"".join(
         (
-            header.model_dump_json().encode() + b"\n",
+            header.model_dump_json(exclude=_NOT_WRITTEN).encode() + b"\n",
             level + b"\n",
             encode_actions(replay.actions),
             sums.table.T.astype(_CHECKSUM).tobytes(),

@@ -62,7 +62,7 @@ class ReplayKeeper:
         """Record a step."""
         if self._recorder is None:
             return
-        self._recorder.record(force_n, transition.reward)
+        self._recorder.record(force_n)
         now_s = float(simulation.time_s[0])
         if self._directory is not None and now_s >= self._saved_s + SAVE_EVERY_S:
             self._saved_s = now_s

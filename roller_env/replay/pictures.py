@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from roller_env.drawing.canvas import Picture
 from roller_env.drawing.renderer import GameRenderer
-from roller_env.drawing.video import END_S, with_panel, write_video
+from roller_env.drawing.video import with_panel, write_video
 from roller_env.level.expand import coin_positions
 from roller_env.replay.contents import Replay
 from roller_env.replay.playback import Playback
@@ -21,6 +21,9 @@ Camera = int | Literal["game"]
 MP4_FPS: Final = 30.0
 GIF_FPS: Final = 10.0
 """At most so many pictures a second; a film shows every control step, or every n-th."""
+
+END_S: Final = 1.0
+"""How long a film stands still at its end."""
 
 SHEET_COLUMNS: Final = 4
 SHEET_ROWS: Final = 4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from itertools import pairwise
 
 import numpy as np
@@ -9,10 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from roller_env.game.result import REWARD_TERMS
 from roller_env.game.rewards import (
     RewardWeights,
+    add_up,
+    event_terms,
     follow_route,
-    points_reward,
     route_progress,
     shaping,
 )
@@ -70,17 +73,32 @@ def test_a_coin_is_paid_once() -> None:
 def test_several_coins_in_one_step_are_all_paid() -> None:
     rails = Rails(make_level(coins=[coin(*resting(0.1 * i)) for i in range(3)]))
     events = rails.go(resting(0.1))
-    np.testing.assert_array_equal(points_reward(events, RewardWeights(coin=2.0)), [6.0])
+    np.testing.assert_array_equal(event_terms(events, RewardWeights(coin=2.0)), [[6, 0, 0, 0]])
     again = rails.go(resting())
-    np.testing.assert_array_equal(points_reward(again, RewardWeights()), [0.0])
+    np.testing.assert_array_equal(event_terms(again, RewardWeights()), [[0, 0, 0, 0]])
 
 
 def test_the_finish_and_the_fall_are_paid_by_their_weights() -> None:
     weights = RewardWeights(finish=7.0, fall=-3.0)
     rails = Rails(make_level(finish={"at": (3.0, 0.0, 0.5), "size": (1, 1, 1)}))
-    np.testing.assert_array_equal(points_reward(rails.go(resting(5.0)), weights), [7.0])
+    finished = event_terms(rails.go(resting(5.0)), weights)
+    np.testing.assert_array_equal(finished, [[0, 7, 0, 0]])
     rails = Rails(make_level())
-    np.testing.assert_array_equal(points_reward(rails.go((0, 0, -40.0)), weights), [-3.0])
+    fallen = event_terms(rails.go((0, 0, -40.0)), weights)
+    np.testing.assert_array_equal(fallen, [[0, 0, -3, 0]])
+
+
+def test_terms_are_added_up_in_their_order_and_kept_apart() -> None:
+    terms = np.array([[0.1, 0.2, 0.3, 1e-17], [1.0, 0.0, -1.0, 0.5]])
+    total, kept = np.ones(2), np.ones((2, 4))
+    reward = add_up(terms, total, kept)
+    assert reward.tolist() == [0.1 + 0.2 + 0.3 + 1e-17, 0.5]
+    assert total.tolist() == [1.0 + reward[0], 1.5]
+    np.testing.assert_array_equal(kept, 1.0 + terms)
+
+
+def test_the_terms_are_those_that_have_weights() -> None:
+    assert tuple(field.name for field in fields(RewardWeights)) == REWARD_TERMS
 
 
 def test_standing_still_is_worth_no_points() -> None:

@@ -120,7 +120,7 @@ def test_a_game_that_ends_otherwise_here_is_not_passed_off_as_the_one_on_record(
     tmp_path: Path,
 ) -> None:
     played = wandered("flat", seed=3)
-    result = played.result.model_copy(update={"coins": played.result.coins + 1})
+    result = replace(played.result, coins=played.result.coins + 1)
     old = load_any(written(of_format_1(replace(played, result=result)), tmp_path))
     with pytest.raises(ReplayError, match=r"ended in .* 1 coins .* it ends in .* 0 coins"):
         record_anew(old)
