@@ -34,6 +34,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from roller_env.envs.sb3 import VecSnapshot
 from roller_env.game.cameras import MODES
+from roller_env.game.result import REWARD_TERMS
 from roller_env.problems import shown
 from roller_env.simulation import Snapshot
 from roller_env.training.config import TrainingConfig
@@ -159,7 +160,7 @@ def load_checkpoint(file: Path) -> Checkpoint:
             file=file,
             config=TrainingConfig.model_validate(facts["config"]),
             progress=Progress(int(progress["steps"]), float(progress["wall_s"])),
-            state=_nested({**facts["state"], **arrays}),
+            state=_nested({**facts["state"], **_with_sums(arrays)}),
         )
     except (zipfile.BadZipFile, SafetensorError, ValidationError) as error:
         raise _damaged(file, str(error)) from None
@@ -174,6 +175,22 @@ def _members(body: bytes) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
             if container.getinfo(name).file_size > len(body):
                 raise ValueError(f"{name} is larger than the file")
         return from_json(container.read(_STATE)), safetensors.numpy.load(container.read(_ARRAYS))
+
+
+def _with_sums(arrays: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    """Return a checkpoint's arrays with sums of rewards for games written before there were any.
+
+    They begin at 0: nothing but what an episode's last info tells depends on them.
+    """
+    sums = {}
+    for name, steps in arrays.items():
+        parent, _, leaf = name.rpartition(_BETWEEN_NAMES)
+        if leaf == "steps" and parent.endswith("game"):
+            sums[f"{parent}{_BETWEEN_NAMES}total_reward"] = np.zeros(steps.shape)
+            sums[f"{parent}{_BETWEEN_NAMES}reward_terms"] = np.zeros(
+                (*steps.shape, len(REWARD_TERMS))
+            )
+    return sums | arrays
 
 
 def _damaged(file: Path, fault: str) -> CheckpointError:

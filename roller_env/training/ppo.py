@@ -15,7 +15,9 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecNormalize
 
+from roller_env.envs.infos import TERMS
 from roller_env.envs.sb3 import RollerVecEnv
+from roller_env.game.result import REWARD_TERMS
 from roller_env.training.checkpoint import Progress, load_checkpoint, save_checkpoint
 from roller_env.training.config import TrainingConfig
 from roller_env.training.display import ProgressDisplay
@@ -136,6 +138,10 @@ class _Episodes:
             "rollout/coins": self._mean([info["coins"] for info in self.infos]),
             "rollout/fall_rate": self._mean([info["fall"] for info in self.infos]),
             "rollout/diverged": sum(info["diverged"] for info in self.infos),
+            **{
+                f"reward/{term}": self._mean([info[TERMS][term] for info in self.infos])
+                for term in REWARD_TERMS
+            },
         }
 
     @staticmethod

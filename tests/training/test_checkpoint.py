@@ -122,6 +122,22 @@ def test_random_generators_come_back_where_they_were(
     assert draw() == expected
 
 
+def test_a_checkpoint_of_before_rewards_were_summed_up_is_gone_on_with(
+    trained: tuple[PPO, Checkpoint, Path], tmp_path: Path
+) -> None:
+    model, _, newer = trained
+    facts, arrays = unpacked(newer)
+    sums = [name for name in arrays if name.endswith(("/total_reward", "/reward_terms"))]
+    assert len(sums) == 4, "of the games under way and of those that are practised"
+    for name in sums:
+        del arrays[name]
+    file = tmp_path / "checkpoint.zip"
+    file.write_bytes(packed(facts, arrays))
+    was, now = games(model), games(restored(load_checkpoint(file)))
+    assert np.array_equal(was.physics, now.physics)
+    assert not now.game["reward_terms"].any()
+
+
 def test_what_is_known_of_a_run_needs_no_environment(
     trained: tuple[PPO, Checkpoint, Path],
 ) -> None:
