@@ -15,7 +15,7 @@ Examples::
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -23,7 +23,7 @@ import tyro
 from tqdm import tqdm
 
 from roller_env.assets import asset_directory
-from roller_env.config import EnvConfig, make_config
+from roller_env.config import EnvConfig
 from roller_env.level import Level, LevelError, load_level, shipped_levels
 from roller_env.problems import printable
 from roller_env.replay import (
@@ -112,8 +112,7 @@ def play_again(file: Path, config: EnvConfig) -> Replay:
         ReplayError: it cannot be read, or its game ends otherwise now.
     """
     played = load_any(file)
-    options = played.options.keywords() | {"physics": config.physics}
-    return record_anew(played, make_config(level=config.level, num_threads=1, **options))
+    return record_anew(played, replace(played.options, level=config.level, physics=config.physics))
 
 
 if __name__ == "__main__":

@@ -73,7 +73,7 @@ def _evaluate(arguments: Arguments) -> None:
     policy = load_policy(arguments.run, trust=arguments.trust)
     config = policy.config
     if arguments.level is not None:
-        config = config.model_copy(update={"level": arguments.level})
+        config = config.on_level(arguments.level)
     with reports_in(arguments.output or arguments.run):
         evaluation = evaluate_policy(
             policy, config, arguments.episodes, arguments.seed, player_of(arguments.run)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -41,8 +42,13 @@ class RewardWeights:
 
     def __post_init__(self) -> None:
         """Refuse weights that are not finite numbers."""
-        for name in self.__slots__:
-            value = checks.number(f"reward_weights.{name}", getattr(self, name))
+        checked = checks.each(
+            {
+                name: partial(checks.number, f"reward_weights.{name}", getattr(self, name))
+                for name in REWARD_TERMS
+            }
+        )
+        for name, value in checked.items():
             object.__setattr__(self, name, value)
 
 

@@ -1,7 +1,7 @@
 """Replays: episodes on record, played again bit for bit, filmed, and turned into data sets."""
 
 from roller_env.replay.checksums import Checksums
-from roller_env.replay.contents import Options, Replay, Versions
+from roller_env.replay.contents import Replay, Versions
 from roller_env.replay.errors import ReplayError
 from roller_env.replay.file import load_replay, save_replay, shipped_replays
 from roller_env.replay.playback import Frame, Playback, Verification, frames, verify
@@ -10,7 +10,6 @@ from roller_env.replay.recorder import Recorder, record_episode
 __all__ = [
     "Checksums",
     "Frame",
-    "Options",
     "Playback",
     "Recorder",
     "Replay",

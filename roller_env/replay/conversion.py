@@ -10,11 +10,10 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.config import EnvConfig, make_config
+from roller_env.config import EnvConfig
 from roller_env.game.result import EpisodeResult
-from roller_env.level import Level
 from roller_env.replay.actions import actions_of
-from roller_env.replay.contents import Options, Replay, check_game
+from roller_env.replay.contents import Replay, check_game, recorded_options
 from roller_env.replay.errors import ReplayError
 from roller_env.replay.file import Header, Header2, read_whole, replay_of, unpack
 from roller_env.replay.recorder import Recorder, place_at_starts
@@ -34,8 +33,7 @@ class Format1:
     they are of how the game was kept in memory then.
     """
 
-    level: Level
-    options: Options
+    options: EnvConfig
     start: tuple[float, float, float]
     intro: bool
     force_n: Float64
@@ -65,13 +63,13 @@ def load_any(file: str | os.PathLike[str]) -> Replay | Format1:
         header, level, numbers = unpack(read_whole(path), (Header2, _Header1))
         if isinstance(header, Header2):
             return replay_of(header, level, numbers)
-        check_game(level, header.options, header.start, header.steps)
+        options = recorded_options(header.options, level)
+        check_game(options, header.start, header.steps)
     except ReplayError as error:
         raise ReplayError(f"{path}: {error}") from None
     forces = numbers[: header.steps * _FORCE.itemsize]
     return Format1(
-        level=level,
-        options=header.options,
+        options=options,
         start=header.start,
         intro=header.intro,
         force_n=np.frombuffer(forces, "<f8").astype(np.float64).reshape(-1, 2),
@@ -95,8 +93,7 @@ def record_anew(played: Replay | Format1, config: EnvConfig | None = None) -> Re
         ReplayError: a force is none of an action of the configured mode, which is found before
             anything is played; or the game ends otherwise.
     """
-    if config is None:
-        config = make_config(level=played.level, num_threads=1, **played.options.keywords())
+    config = played.options if config is None else config
     actions_of(config.action, played.force_n)
     simulation = Simulation(config)
     place_at_starts(simulation, np.array([played.start]), played.intro)

@@ -97,8 +97,7 @@ def _groups(replays: Iterable[Replay]) -> Iterator[list[Replay]]:
 
 def _game_of(replay: Replay) -> tuple[str, str, bool, tuple[str, ...]]:
     """Return what is the same for replays that can be played together."""
-    options = replay.options.model_dump_json()
-    return replay.level_hash, options, replay.intro, replay.checksums.quantities
+    return *replay.environment_key, replay.intro, replay.checksums.quantities
 
 
 def _play(replays: list[Replay], changes: dict[str, Any]) -> list[Experience]:

@@ -25,11 +25,20 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    ValidationError,
+)
 from pydantic_core import from_json
 
 from roller_env import checks
 from roller_env.assets import asset_directory
+from roller_env.config import EnvConfig, make_config
 from roller_env.game.result import EpisodeResult
 from roller_env.level import Level, LevelError, load_level
 from roller_env.regular_files import read_regular_file
@@ -45,10 +54,10 @@ from roller_env.replay.contents import (
     FORMAT_VERSION,
     MAX_STEPS,
     Number,
-    Options,
     Replay,
     Text,
     Versions,
+    recorded_options,
 )
 from roller_env.replay.errors import ReplayError
 
@@ -84,7 +93,26 @@ def _possible(result: EpisodeResult) -> EpisodeResult:
     return result
 
 
+def _options(found: object) -> EnvConfig:
+    """Return the options that a header tells: all that a recording has, and no others."""
+    if isinstance(found, EnvConfig):
+        return found
+    names = EnvConfig().episode_options()
+    if not isinstance(found, dict):
+        raise ValueError(f"found {str(found)[:20]!r}; must be a mapping of options")
+    checks.known_names("options", found, names)
+    missing = [name for name in names if name not in found]
+    if missing:
+        raise ValueError(f"found no {' and no '.join(missing)}; must have it")
+    if not isinstance(found["physics"], dict):
+        raise ValueError("physics: found a name; must be the preset's values")
+    return make_config(**found)
+
+
 RecordedResult = Annotated[EpisodeResult, AfterValidator(_possible)]
+RecordedOptions = Annotated[
+    EnvConfig, PlainValidator(_options), PlainSerializer(EnvConfig.episode_options)
+]
 
 
 class Header(BaseModel):
@@ -100,7 +128,7 @@ class Header(BaseModel):
     intro: bool
     steps: Annotated[int, Field(ge=0, le=MAX_STEPS)]
     result: RecordedResult
-    options: Options
+    options: RecordedOptions
     level_bytes: Annotated[int, Field(ge=2, le=MAX_LEVEL_BYTES)]
     level_sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
@@ -250,8 +278,7 @@ def replay_of(header: Header2, level: Level, numbers: bytes) -> Replay:
     actions, sums = numbers[: header.action_bytes], numbers[header.action_bytes :]
     table = np.frombuffer(sums, _CHECKSUM).astype(np.uint32).reshape(header.checksums_shape)
     return Replay(
-        level=level,
-        options=header.options,
+        options=recorded_options(header.options, level),
         start=header.start,
         intro=header.intro,
         actions=decode_actions(header.options.action, header.encoding, actions),

@@ -131,5 +131,5 @@ def _captions(replay: Replay) -> tuple[str, str]:
     played = f"{replay.player or 'unknown player'}, {result.time_s:.1f} s to: {result.outcome}"
     in_level = len(coin_positions(level)[0])
     coins = f"{result.coins} of {in_level} coins ({result.score_percent:.0f} %)"
-    preset = replay.options.physics.name
+    preset = replay.options.preset.name
     return level.title or level.name, f"{played}, {coins}, level {level.name}, physics {preset}"

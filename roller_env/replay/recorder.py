@@ -13,7 +13,7 @@ from gymnasium.utils import seeding
 from roller_env.config import EnvConfig
 from roller_env.replay.actions import actions_of
 from roller_env.replay.checksums import QUANTITIES, Checksums, checksums, interval_of
-from roller_env.replay.contents import MAX_STEPS, Options, Replay, Versions
+from roller_env.replay.contents import MAX_STEPS, Replay, Versions, recorded_options
 from roller_env.replay.errors import ReplayError
 from roller_env.simulation import Simulation
 
@@ -60,7 +60,7 @@ class Recorder:
         self._player = player
         self._every = check_every or interval_of(simulation.duration_s)
         self._takes: dict[int, _Take] = {}
-        self._options = Options.of(simulation.config)
+        self._options = recorded_options(simulation.config, simulation.compiled.level)
 
     def begin(self, rows: Sequence[int] | Int64 = (0,), seed: int | None = None) -> None:
         """Record ``rows`` from here on, whose episodes have just begun.
@@ -153,7 +153,6 @@ class Recorder:
             sums = [*sums, checksums(simulation, np.array([row]), _NAMES)[0]]
         force_n = np.array(take.forces).reshape(-1, 2)
         return Replay(
-            level=simulation.compiled.level,
             options=self._options,
             start=take.start,
             intro=take.intro,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -14,21 +15,28 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    JsonValue,
     Strict,
     ValidationError,
+    ValidationInfo,
+    field_serializer,
     field_validator,
     model_validator,
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from roller_env.config import MAX_ENVS, make_config
+from roller_env.checks import Refused, messages_of, nearest
+from roller_env.config import MAX_ENVS, EnvConfig, LevelSource
 from roller_env.envs.spaces import action_space, observation_space
-from roller_env.problems import Problem, listed
+from roller_env.problems import FieldPath, Problem, listed
 from roller_env.training.config_source import ConfigError, ConfigSource
 
 MAX_STEPS: Final = 10**12
 MAX_ROLLOUT: Final = 10**8
 """Samples of a rollout: they are in memory, some hundred bytes each."""
+
+_OPTIONS: Final = tuple(name for name in EnvConfig().keywords() if name != "level")
+"""Of an environment; the level is said of the training."""
 
 _LONG: Final = 64
 """Characters of a value that a message shows."""
@@ -119,9 +127,12 @@ class TrainingConfig(_Frozen):
 
     Attributes:
         level: name or path of a level, as ``Roller/Level-v0`` takes it.
-        environment: options of the environment (``reward``, ``observation``, ...), those of
-            `roller_env.config.EnvConfig`; ``reward_weights`` by name.
         algorithm: how it learns.
+        ppo: what the algorithm is told.
+        environment: what it learns in. It is given as the options that are not the defaults; the
+            discount is by default the learner's.
+        evaluation_environment: what it is judged in. It is given as the options that are other ones
+            than in training, such as ``physics: default`` after a training with ``fast``.
         seed: of the environments, the network's initial weights and the order of the samples.
         num_envs: environments that are stepped together.
         practice_share: of the episodes that begin at a waypoint of the route that the agent has
@@ -134,18 +145,18 @@ class TrainingConfig(_Frozen):
         normalise_rewards: with the running variance of the discounted return.
         torch_threads: of the network's arithmetic.
         evaluation_episodes: played by the trained policy for the evaluation table.
-        evaluation_environment: options that are other ones then, such as ``physics: default``
-            after a training with ``fast``.
         evaluation_replays: whether every episode of the evaluation is kept as a replay.
         demonstrations: replays or a Minari data set that the policy learns from before its first
             step, as `roller_env.training.demonstrations.load_demonstrations` takes them.
         cloning: how it learns from them.
-        ppo: what the algorithm is told.
     """
 
     level: Name
-    environment: Mapping[str, Any] = Field(default_factory=dict)
     algorithm: Literal["ppo"] = "ppo"
+    ppo: PPOConfig = PPOConfig()
+    # Given as options, which are completed by the fields above them.
+    environment: EnvConfig = Field({}, validate_default=True)
+    evaluation_environment: EnvConfig = Field({}, validate_default=True)
     seed: Annotated[WholeNumber, Field(ge=0, lt=2**31)] = 0
     num_envs: Annotated[WholeNumber, Field(gt=0, le=MAX_ENVS)] = 256
     practice_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
@@ -156,11 +167,9 @@ class TrainingConfig(_Frozen):
     normalise_rewards: bool = True
     torch_threads: Annotated[WholeNumber, Field(gt=0, le=1024)] = 1
     evaluation_episodes: Annotated[WholeNumber, Field(ge=2, le=10**6)] = 100
-    evaluation_environment: Mapping[str, Any] = Field(default_factory=dict)
     evaluation_replays: bool = False
     demonstrations: Name | None = None
     cloning: CloningConfig = CloningConfig()
-    ppo: PPOConfig = PPOConfig()
 
     @model_validator(mode="after")
     def _batches_fill_the_rollout(self) -> TrainingConfig:
@@ -191,25 +200,32 @@ class TrainingConfig(_Frozen):
             )
         return self
 
-    @field_validator("environment", "evaluation_environment")
+    @field_validator("environment", "evaluation_environment", mode="plain")
     @classmethod
-    def _environment_takes_these(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
-        if "level" in options:
-            raise ValueError("level: is a field of the training itself; remove it here")
-        try:
-            make_config(**options)
-        except TypeError as error:  # an unknown option, which pydantic would let through
-            raise ValueError(str(error)) from None
-        return options
+    def _completed(cls, given: object, info: ValidationInfo) -> EnvConfig:
+        # What was refused itself is not there.
+        known = info.data
+        base = _default_env(known.get("level", EnvConfig.level), known.get("ppo", PPOConfig()))
+        if info.field_name == "evaluation_environment":
+            base = known.get("environment", base)
+        if isinstance(given, EnvConfig):
+            return replace(given, level=base.level)
+        if not isinstance(given, Mapping):
+            raise ValueError(f"found {_short(given)}; must be a mapping of options")
+        return _with_options(base, given)
+
+    @field_serializer("environment")
+    def _options(self, environment: EnvConfig) -> dict[str, JsonValue]:
+        return environment.differences(_default_env(self.level, self.ppo))
+
+    @field_serializer("evaluation_environment")
+    def _evaluation_options(self, environment: EnvConfig) -> dict[str, JsonValue]:
+        return environment.differences(self.environment)
 
     @model_validator(mode="after")
     def _the_agent_fits_into_its_evaluation(self) -> TrainingConfig:
-        trained, judged = (
-            make_config(level=self.level, **options)
-            for options in (self.environment_options, self.evaluation_options)
-        )
         for space in (observation_space, action_space):
-            if space(trained) != space(judged):
+            if space(self.environment) != space(self.evaluation_environment):
                 name = space.__name__.replace("_space", "")
                 message = (
                     "evaluation_environment: an agent can be judged only with the observations "
@@ -218,15 +234,13 @@ class TrainingConfig(_Frozen):
                 raise PydanticCustomError("other_spaces", message, {"name": name})
         return self
 
-    @property
-    def environment_options(self) -> dict[str, Any]:
-        """The options of the training's environments; they discount as the learner does."""
-        return {"discount": self.ppo.gamma, **self.environment}
-
-    @property
-    def evaluation_options(self) -> dict[str, Any]:
-        """The options of the evaluation's environments."""
-        return {**self.environment_options, **self.evaluation_environment}
+    def on_level(self, level: str) -> TrainingConfig:
+        """Return the configuration with another level, its name or path."""
+        changes = {
+            name: replace(getattr(self, name), level=level)
+            for name in ("environment", "evaluation_environment")
+        }
+        return self.model_copy(update={"level": level, **changes})
 
     @property
     def steps_per_update(self) -> int:
@@ -239,12 +253,45 @@ class TrainingConfig(_Frozen):
 
     def differences(self, other: TrainingConfig) -> list[str]:
         """Return ``field: mine, theirs`` for every field in which the two differ."""
-        mine, theirs = (_flat(config.model_dump(mode="json")) for config in (self, other))
+        mine, theirs = (
+            _flat(
+                config.model_dump(mode="json")
+                | {"environment": replace(config.environment, level=EnvConfig.level).to_json()}
+            )
+            for config in (self, other)
+        )
         return [
             f"{name}: {mine.get(name)!r}, {theirs.get(name)!r}"
             for name in sorted(mine.keys() | theirs.keys())
             if mine.get(name) != theirs.get(name)
         ]
+
+
+def _default_env(level: LevelSource, ppo: PPOConfig) -> EnvConfig:
+    """Return the environment of which a configuration says nothing."""
+    return EnvConfig(level=level, discount=ppo.gamma)
+
+
+def _with_options(base: EnvConfig, options: Mapping[str, Any]) -> EnvConfig:
+    """Return an environment with other options.
+
+    Raises:
+        ValueError: some are unknown or not allowed; a message each, all of them.
+    """
+    refused = [
+        f"{name}: is a field of the training itself; remove it here"
+        if name == "level"
+        else f"{name}: unknown option; known are {listed(_OPTIONS)}{nearest(str(name), _OPTIONS)}"
+        for name in options
+        if name not in _OPTIONS
+    ]
+    try:
+        made = replace(base, **{name: v for name, v in options.items() if name in _OPTIONS})
+    except ValueError as error:
+        raise Refused([*refused, *messages_of(error)]) from None
+    if refused:
+        raise Refused(refused)
+    return made
 
 
 class _Dumper(yaml.SafeDumper):
@@ -274,33 +321,54 @@ def load_config(file: str | os.PathLike[str], overrides: Sequence[str] = ()) -> 
     try:
         return TrainingConfig.model_validate(source.content)
     except ValidationError as error:
-        problems = [_problem(details, source) for details in error.errors(include_url=False)]
+        problems = [
+            problem
+            for details in error.errors(include_url=False)
+            for problem in _problems(details, source)
+        ]
         raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)) from None
 
 
-def _problem(details: ErrorDetails, source: ConfigSource) -> Problem:
+def _problems(details: ErrorDetails, source: ConfigSource) -> list[Problem]:
     path, message, found = details["loc"], details["msg"], details["input"]
     if details["type"] == "extra_forbidden":
         models: dict[tuple[Any, ...], type[BaseModel]] = {
             ("ppo",): PPOConfig,
             ("cloning",): CloningConfig,
         }
-        written, known = str(path[-1]), tuple(models.get(path[:-1], TrainingConfig).model_fields)
-        message, where = (
-            f"unknown field; known are {listed(known)}",
-            source.where(path, of_key=True),
-        )
-        return Problem(path, message, **where, written=written, known=known)
+        known = tuple(models.get(path[:-1], TrainingConfig).model_fields)
+        return [_unknown(path, known, source)]
     if details["type"] == "value_error":
-        message = str(details["ctx"]["error"])
-        # An option of the environment, whose message begins with its name.
-        option, colon, _ = message.partition(":")
-        if isinstance(found, dict) and colon and option in found:
-            path, message = (*path, option), message.removeprefix(f"{option}: ")
+        messages = messages_of(details["ctx"]["error"])
+        if isinstance(found, dict):
+            return [_of_option(path, found, one, source) for one in messages]
+        (message,) = messages
     elif path and not isinstance(found, dict):
         message = f"{message}; found {_short(found)}"
         if isinstance(found, str) and found.replace("_", "").isdecimal() and "_" in found:
             message += " (write it without '_')"
+    return [Problem(path, message, **source.where(path, of_key=False))]
+
+
+def _unknown(path: FieldPath, known: tuple[str, ...], source: ConfigSource) -> Problem:
+    message = f"unknown field; known are {listed(known)}"
+    where = source.where(path, of_key=True)
+    return Problem(path, message, **where, written=str(path[-1]), known=known)
+
+
+def _of_option(
+    path: FieldPath, options: Mapping[str, Any], message: str, source: ConfigSource
+) -> Problem:
+    """Return the problem with an option of an environment, whose name its message begins with."""
+    name, _, said = message.partition(": ")
+    if name in options and name not in _OPTIONS and name != "level":
+        return _unknown((*path, name), _OPTIONS, source)
+    at: Any = options
+    for part in name.split("."):
+        # An option that is not given itself is at fault beside one that is.
+        if not isinstance(at, Mapping) or part not in at:
+            break
+        at, path, message = at[part], (*path, part), said
     return Problem(path, message, **source.where(path, of_key=False))
 
 

@@ -72,7 +72,7 @@ def load_demonstrations(source: str, config: TrainingConfig) -> list[Demonstrati
         DemonstrationError: there are none, they are of another level, they cannot be read, or
             other observations than the training's are in them.
     """
-    wanted = make_config(level=config.level, **config.environment_options)
+    wanted = config.environment
     path = Path(source)
     try:
         if path.is_file() or list(path.glob(f"*{SUFFIX}")):

@@ -82,7 +82,7 @@ def is_complete(config: TrainingConfig, progress: Progress) -> bool:
 def make_environments(config: TrainingConfig) -> PracticeStarts:
     """Return the environments that a configuration trains in."""
     environments = RollerVecEnv(
-        config.level, config.num_envs, seed=config.seed, **config.environment_options
+        num_envs=config.num_envs, seed=config.seed, **config.environment.keywords()
     )
     return PracticeStarts(environments, config.practice_share, config.seed)
 

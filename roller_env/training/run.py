@@ -99,8 +99,8 @@ def check_playable(config: TrainingConfig) -> None:
         LevelError: the level cannot be used.
         ValueError: an option cannot.
     """
-    for options in (config.environment_options, config.evaluation_options):
-        RollerVectorEnv(1, level=config.level, **options).close()
+    for environment in (config.environment, config.evaluation_environment):
+        RollerVectorEnv(1, **environment.keywords()).close()
 
 
 def _train(
@@ -150,7 +150,7 @@ def evaluate_policy(
     """
     num_envs, repeats = envs_and_repeats(episodes)
     seed = config.seed + EVALUATION_SEED_OFFSET if seed is None else seed
-    envs = RollerVectorEnv(num_envs, level=config.level, **config.evaluation_options)
+    envs = RollerVectorEnv(num_envs, **config.evaluation_environment.keywords())
     try:
         return evaluate(policy, envs, seed=seed, episodes_per_env=repeats, player=player)
     finally:

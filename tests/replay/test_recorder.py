@@ -53,7 +53,7 @@ def test_any_preset_and_any_action_are_on_record(physics: str, action: ActionMod
     assert np.array_equal(played.force_n, forces(action, actions))
     assert verify(played).is_exact
     assert played.result.outcome == "not ended"
-    assert played.options.physics.name == physics
+    assert played.options.preset.name == physics
 
 
 def test_every_row_and_every_episode_of_many_games_is_played_again_alone() -> None:

@@ -44,7 +44,7 @@ def test_an_episode_is_what_the_trainings_environment_gives(replays: Path) -> No
     config = training(reward="shaped", observation="rays")
     demonstrations = load_demonstrations(str(replays), config)
     assert [len(one) for one in demonstrations] == [len(wandered("flat", seed=i)) for i in range(3)]
-    environment = RollerEnv(level="flat", **config.environment_options)
+    environment = RollerEnv(**config.environment.keywords())
     for seed, demonstration in enumerate(demonstrations):
         seen, _ = environment.reset(seed=seed)
         assert isinstance(demonstration.observations, np.ndarray)
