@@ -9,17 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import MISSING, fields
-from difflib import get_close_matches
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, TypeGuard, TypeVar, cast
+
+from roller_env import names
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 _Choice = TypeVar("_Choice", bound=str | int | None)
 _Record = TypeVar("_Record", bound="DataclassInstance")
-
-_LONG_TEXT = 64
 
 
 class Refused(ValueError):
@@ -163,6 +162,5 @@ def known_names(name: str, given: Mapping[Any, object], known: Collection[str]) 
 
 def nearest(written: str, known: Collection[str]) -> str:
     """Return ``; did you mean 'X'?``, or nothing where no known name is near."""
-    lower = {name.lower(): name for name in known}
-    near = get_close_matches(written[:_LONG_TEXT].lower(), lower, n=1)
-    return f"; did you mean {lower[near[0]]!r}?" if near else ""
+    near = names.nearest(written, known)
+    return f"; did you mean {near!r}?" if near is not None else ""

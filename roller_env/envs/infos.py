@@ -11,10 +11,9 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.arrays import Bool, Float64, Int64
 from roller_env.game.result import REWARD_TERMS
 from roller_env.simulation import Simulation
-
-Int64 = npt.NDArray[np.int64]
 
 _KEYS: Final = ("success", "is_success", "score_percent", "coins", "time_s", "fall", "diverged")
 
@@ -49,9 +48,7 @@ def vector_info(simulation: Simulation, rows: Int64 | None = None) -> dict[str, 
     return info
 
 
-def _terms(
-    terms: npt.NDArray[np.float64], ended: npt.NDArray[np.bool_]
-) -> dict[str, npt.NDArray[Any]]:
+def _terms(terms: Float64, ended: Bool) -> dict[str, npt.NDArray[Any]]:
     """Return the terms, (N, 4), of the rows that ended as an info of infos."""
     inner: dict[str, npt.NDArray[Any]] = {}
     for name, values in zip(REWARD_TERMS, terms.T, strict=True):

@@ -8,8 +8,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, cast
 
-import numpy as np
-import numpy.typing as npt
 from mujoco.studio import messages
 from mujoco.studio.dear_imgui import dear_imgui as imgui
 
@@ -22,8 +20,6 @@ from roller_env.play.scene import Quality
 from roller_env.play.session import GameFrame, GameSession, Phase
 from roller_env.play.sound import CoinSound
 from roller_env.replay import Playback, Replay
-
-Float64 = npt.NDArray[np.float64]
 
 JUMP_S: Final = 1.0
 """What the arrow keys go forward and back."""

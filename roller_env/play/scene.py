@@ -17,8 +17,8 @@ from typing import Any, Final, Literal, NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Bool, Float64, Int64
 from roller_env.compile.mjcf import BALL, build_spec
 from roller_env.compile.scenery import SPARKS, STATES, add_scenery, part
 from roller_env.drawing.renderer import FIELD_OF_VIEW_DEG
@@ -28,10 +28,6 @@ from roller_env.game.state import GameState
 from roller_env.level.schema import Level
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.play.effects import Light
-
-Bool = npt.NDArray[np.bool_]
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 PUPPETS: Final = ("coin", "ring", "plate", "gate", "pad", "glow", "trigger", "band")
 """Kinds of scenery that change while playing other than by moving with ``qpos``."""

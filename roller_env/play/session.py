@@ -15,21 +15,18 @@ from enum import Enum
 from typing import Any, Final, Protocol
 
 import numpy as np
-import numpy.typing as npt
 from gymnasium.utils import seeding
 
+from roller_env.arrays import Float64
 from roller_env.compile.compiled import CompiledLevel
 from roller_env.config import EnvConfig, LevelSource
-from roller_env.envs.spaces import action_of_keys
-from roller_env.game.actions import forces
+from roller_env.game.actions import action_of_keys, forces
 from roller_env.game.result import EpisodeResult
 from roller_env.game.state import GameState
 from roller_env.level import Level
 from roller_env.physics.presets import PhysicsPreset, physics_preset
 from roller_env.rigid_body import FixedStepPacer, Pose, interpolate
 from roller_env.simulation import Simulation, Transition
-
-Float64 = npt.NDArray[np.float64]
 
 MAX_CATCH_UP_S: Final = 0.1
 """Most game time that one frame may ask for. After a longer stall the game runs slower than the

@@ -10,11 +10,10 @@ from functools import cache, cached_property
 from importlib.metadata import version
 from typing import Annotated, Any, Final
 
-import numpy as np
-import numpy.typing as npt
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from roller_env import __version__
+from roller_env.arrays import Float64
 from roller_env.config import EnvConfig, make_config
 from roller_env.game.actions import forces
 from roller_env.game.result import EpisodeResult
@@ -25,8 +24,6 @@ from roller_env.replay.actions import Actions, checked_actions
 from roller_env.replay.checksums import MAX_ROWS, QUANTITIES, Checksums, row_count
 from roller_env.replay.errors import ReplayError
 
-Float64 = npt.NDArray[np.float64]
-
 FORMAT_VERSION: Final = 2
 """Raised when a file of before can no longer be read."""
 
@@ -36,7 +33,6 @@ MAX_STEPS: Final = 2**20
 MAX_PHYSICS_STEPS: Final = 2**22
 """Physics steps of a replay, since a file must not be able to ask for days of work: over an hour
 of the finest preset."""
-
 
 MAX_TEXT: Final = 200
 """Characters of a name in a replay."""

@@ -8,18 +8,16 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Float64
 from roller_env.config import EnvConfig
 from roller_env.game.result import EpisodeResult
-from roller_env.replay.actions import actions_of
+from roller_env.replay.actions import recorded_actions
 from roller_env.replay.contents import Replay, check_game, recorded_options
 from roller_env.replay.errors import ReplayError
 from roller_env.replay.file import Header, Header2, read_whole, replay_of, unpack
 from roller_env.replay.recorder import Recorder, place_at_starts
 from roller_env.simulation import Simulation
-
-Float64 = npt.NDArray[np.float64]
 
 _FORCE: Final = np.dtype(("<f8", 2))
 _CHECKSUM_BYTES: Final = 4
@@ -94,7 +92,7 @@ def record_anew(played: Replay | Format1, config: EnvConfig | None = None) -> Re
             anything is played; or the game ends otherwise.
     """
     config = played.options if config is None else config
-    actions_of(config.action, played.force_n)
+    recorded_actions(config.action, played.force_n)
     simulation = Simulation(config)
     place_at_starts(simulation, np.array([played.start]), played.intro)
     recorder = Recorder(simulation, played.player)

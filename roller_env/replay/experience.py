@@ -10,18 +10,14 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.envs.spaces import shape_observation
-from roller_env.replay.actions import actions_of
+from roller_env.arrays import Bool, Float64
+from roller_env.envs.spaces import Observations, shape_observation
+from roller_env.replay.actions import recorded_actions
 from roller_env.replay.checksums import checksums
 from roller_env.replay.contents import Replay
 from roller_env.replay.errors import ReplayError
 from roller_env.replay.playback import play_together
 from roller_env.simulation import Simulation
-
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
-Observations = npt.NDArray[np.float32] | dict[str, npt.NDArray[np.float32]]
-
 
 STATES_AT_ONCE: Final = 2**18
 """Most states of replays that are played together: their observations, 110 numbers each at most,
@@ -127,7 +123,7 @@ def _play(replays: list[Replay], changes: dict[str, Any]) -> list[Experience]:
         Experience(
             replay=replay,
             observations=shape_observation(config, seen[begin : end + 1, row]),
-            actions=actions_of(config.action, replay.force_n[begin:]),
+            actions=recorded_actions(config.action, replay.force_n[begin:]),
             rewards=reward[begin:end, row].copy(),
             terminated=terminated[begin:end, row].copy(),
             truncated=truncated[begin:end, row].copy(),

@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Float64
 from roller_env.game.result import EpisodeResult
 from roller_env.game.state import GameState
 from roller_env.replay.checksums import checksums
 from roller_env.replay.contents import Replay, Versions
 from roller_env.replay.recorder import place_at_starts
 from roller_env.simulation import Simulation, Snapshot, Transition
-
-Float64 = npt.NDArray[np.float64]
 
 _KEYFRAMES: Final = 256
 """Moments kept while playing, so that going back need not begin at the start."""

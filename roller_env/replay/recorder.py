@@ -7,19 +7,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 from gymnasium.utils import seeding
 
+from roller_env.arrays import Float64, Int64, UInt32
 from roller_env.config import EnvConfig
-from roller_env.replay.actions import actions_of
+from roller_env.replay.actions import recorded_actions
 from roller_env.replay.checksums import QUANTITIES, Checksums, checksums, interval_of
 from roller_env.replay.contents import MAX_STEPS, Replay, Versions, recorded_options
 from roller_env.replay.errors import ReplayError
 from roller_env.simulation import Simulation
-
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
-UInt32 = npt.NDArray[np.uint32]
 
 _NAMES = tuple(QUANTITIES)
 
@@ -156,7 +152,7 @@ class Recorder:
             options=self._options,
             start=take.start,
             intro=take.intro,
-            actions=actions_of(simulation.config.action, force_n),
+            actions=recorded_actions(simulation.config.action, force_n),
             checksums=Checksums(self._every, _NAMES, np.array(sums)),
             result=simulation.result(row),
             versions=Versions.here(),

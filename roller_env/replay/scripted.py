@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Float64
 from roller_env.game.actions import DIRECTIONS, forces
 from roller_env.game.observations import STATE_ENTRIES, layout
 from roller_env.level import Level
@@ -21,8 +21,6 @@ from roller_env.level.expand import coin_positions
 from roller_env.replay.contents import Replay
 from roller_env.replay.playback import Playback
 from roller_env.simulation import Simulation
-
-Float64 = npt.NDArray[np.float64]
 
 PLAYER: Final = "scripted player"
 """Who played, in a replay's words."""

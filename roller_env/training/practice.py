@@ -13,15 +13,13 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 from stable_baselines3.common.vec_env import VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
+from roller_env.arrays import Bool, Int64
 from roller_env.envs.sb3 import RollerVecEnv, VecSnapshot
 from roller_env.envs.spaces import shape_observation
 from roller_env.simulation import Snapshot
-
-Int64 = npt.NDArray[np.int64]
 
 FROM_START: Final = "from_start"
 """Key of a finished episode's info: whether it began at the level's start."""
@@ -40,7 +38,7 @@ class PracticeSnapshot:
     environments: VecSnapshot
     games: dict[int, list[Snapshot]]
     waypoint: Int64
-    from_start: npt.NDArray[np.bool_]
+    from_start: Bool
     generator: Mapping[str, Any]
 
 
@@ -82,7 +80,7 @@ class PracticeStarts(VecEnvWrapper):
             self._begin(ended[self._rng.random(len(ended)) < self._share], observations)
         return observations, rewards, dones, infos
 
-    def _keep(self, dones: npt.NDArray[np.bool_]) -> None:
+    def _keep(self, dones: Bool) -> None:
         """Keep the games that have just come to a waypoint."""
         simulation = self.environments.simulation
         waypoint = simulation.state.waypoint

@@ -11,17 +11,15 @@ from typing import Any, Final
 
 import matplotlib
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
+from roller_env.arrays import Float64
 from roller_env.training.config import TrainingConfig
 from roller_env.training.evaluate import CONFIDENCE, Estimate, Evaluation
 from roller_env.training.files import RunFiles, write_atomically
 from roller_env.training.logs import STEPS, read_progress
-
-Float64 = npt.NDArray[np.float64]
 
 _SMOOTHING_SHARE: Final = 1.0 / 40.0
 """Width of the learning curve's Gaussian, as a share of the whole training."""

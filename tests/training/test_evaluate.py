@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from roller_env.envs.spaces import Observations
 from roller_env.envs.vector import RollerVectorEnv
 from roller_env.replay import load_replay, verify
 from roller_env.training.evaluate import (
@@ -24,7 +25,6 @@ from roller_env.training.evaluate import (
     proportion,
 )
 from roller_env.training.files import RunError
-from roller_env.training.normalisation import Observations
 
 Z95 = NormalDist().inv_cdf(0.975)
 FORWARD = 1
