@@ -101,7 +101,7 @@ def clone(
     """
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(demonstrations))
-    count = max(1, round(config.held_out_share * len(demonstrations)))
+    count = max(1, round(config.held_out_fraction * len(demonstrations)))
     learnt = [demonstrations[i] for i in order[count:]]
     normaliser = model.get_vec_normalize_env()
     assert normaliser is not None

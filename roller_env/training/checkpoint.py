@@ -38,9 +38,14 @@ from roller_env.game.result import REWARD_TERMS
 from roller_env.problems import shown
 from roller_env.simulation import Snapshot
 from roller_env.training.config import TrainingConfig
+from roller_env.training.curriculum import (
+    CurriculumSnapshot,
+    StartStateCurriculum,
+    joined,
+    separate,
+)
 from roller_env.training.files import RunError, read_whole, write_atomically
 from roller_env.training.normalisation import statistics
-from roller_env.training.practice import PracticeSnapshot, PracticeStarts, joined, separate
 
 Tree = dict[str, Any]
 """Names to arrays, to JSON's values, or to such trees."""
@@ -223,7 +228,7 @@ def _state(model: PPO) -> Tree:
             "rewards": _moments(normaliser.ret_rms),
             "returns": normaliser.returns,
         },
-        "environments": _of_practice(environments.snapshot()),
+        "environments": _of_curriculum(environments.snapshot()),
         "random": _random_state(),
     }
 
@@ -250,16 +255,16 @@ def _set_state(model: PPO, state: Tree) -> None:
         _set_moments(entry, state["normaliser"]["observations"][name])
     _set_moments(normaliser.ret_rms, state["normaliser"]["rewards"])
     normaliser.returns = state["normaliser"]["returns"]
-    environments.restore(_practice(state["environments"], environments.snapshot()))
+    environments.restore(_curriculum(state["environments"], environments.snapshot()))
     # Last, because making and resetting a learner draws numbers.
     _set_random_state(state["random"])
 
 
-def _wrappers(model: PPO) -> tuple[VecNormalize, PracticeStarts]:
+def _wrappers(model: PPO) -> tuple[VecNormalize, StartStateCurriculum]:
     normaliser = model.get_vec_normalize_env()
     assert normaliser is not None
     environments = normaliser.venv
-    assert isinstance(environments, PracticeStarts)
+    assert isinstance(environments, StartStateCurriculum)
     return normaliser, environments
 
 
@@ -276,7 +281,7 @@ def _set_moments(entry: RunningMeanStd, moments: Tree) -> None:
     entry.count = float(moments["count"])
 
 
-def _of_practice(snapshot: PracticeSnapshot) -> Tree:
+def _of_curriculum(snapshot: CurriculumSnapshot) -> Tree:
     waypoints = [waypoint for waypoint, games in snapshot.games.items() for _ in games]
     games = [game for games in snapshot.games.values() for game in games]
     return {
@@ -292,7 +297,7 @@ def _of_practice(snapshot: PracticeSnapshot) -> Tree:
     }
 
 
-def _practice(tree: Tree, own: PracticeSnapshot) -> PracticeSnapshot:
+def _curriculum(tree: Tree, own: CurriculumSnapshot) -> CurriculumSnapshot:
     """Return the snapshot that a tree is, of the kind that the environments' own is."""
     games = own.environments.games
     if tree["level"] != games.level.model_dump_json():
@@ -302,7 +307,7 @@ def _practice(tree: Tree, own: PracticeSnapshot) -> PracticeSnapshot:
         rows = separate(_snapshot(tree["kept"], games, len(tree["kept_at"])))
         for waypoint, game in zip(tree["kept_at"], rows, strict=True):
             kept.setdefault(int(waypoint), []).append(game)
-    return PracticeSnapshot(
+    return CurriculumSnapshot(
         environments=VecSnapshot(
             games=_snapshot(tree["games"], games, len(tree["returns"])),
             returns=tree["returns"],

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 import yaml
 from pydantic import (
@@ -64,6 +65,20 @@ Name = Annotated[str, Field(min_length=1, max_length=1_000), AfterValidator(_pri
 class _Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
+    former_names: ClassVar[Mapping[str, str]] = {}
+    """Fields' names of before, which are still taken, and what they are now."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _renamed(cls, given: Any) -> Any:
+        if not isinstance(given, Mapping):
+            return given
+        former = [old for old, new in cls.former_names.items() if old in given and new not in given]
+        for old in former:
+            message = f"{old} is called {cls.former_names[old]} now"
+            warnings.warn(message, DeprecationWarning, stacklevel=2)
+        return {cls.former_names[n] if n in former else n: value for n, value in given.items()}
+
 
 class PPOConfig(_Frozen):
     """Proximal policy optimisation, in the field's own terms.
@@ -113,13 +128,15 @@ class CloningConfig(_Frozen):
             on the episodes held out.
         batch_size: decisions of one gradient step.
         learning_rate: of Adam.
-        held_out_share: of the episodes, not learnt from; one at least.
+        held_out_fraction: of the episodes, not learnt from; one episode at least.
     """
+
+    former_names: ClassVar = {"held_out_share": "held_out_fraction"}
 
     epochs: Count = 50
     batch_size: Count = 256
     learning_rate: PositiveFloat = 1e-3
-    held_out_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
+    held_out_fraction: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
 
 
 class TrainingConfig(_Frozen):
@@ -135,8 +152,9 @@ class TrainingConfig(_Frozen):
             than in training, such as ``physics: default`` after a training with ``fast``.
         seed: of the environments, the network's initial weights and the order of the samples.
         num_envs: environments that are stepped together.
-        practice_share: of the episodes that begin at a waypoint of the route that the agent has
-            reached before, not at the level's start; see `roller_env.training.practice`.
+        start_state_curriculum: fraction of the training's episodes that begin at a waypoint of the
+            route that the agent has reached before, not at the level's start; see
+            `roller_env.training.curriculum`.
         total_steps: environment steps, over all environments, after which training ends.
         wall_clock_budget_s: training ends after this time at the latest; None for no limit.
             A run that ends by time is not repeatable bit for bit on another machine.
@@ -151,6 +169,8 @@ class TrainingConfig(_Frozen):
         cloning: how it learns from them.
     """
 
+    former_names: ClassVar = {"practice_share": "start_state_curriculum"}
+
     level: Name
     algorithm: Literal["ppo"] = "ppo"
     ppo: PPOConfig = PPOConfig()
@@ -159,7 +179,7 @@ class TrainingConfig(_Frozen):
     evaluation_environment: EnvConfig = Field({}, validate_default=True)
     seed: Annotated[WholeNumber, Field(ge=0, lt=2**31)] = 0
     num_envs: Annotated[WholeNumber, Field(gt=0, le=MAX_ENVS)] = 256
-    practice_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    start_state_curriculum: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     total_steps: Annotated[WholeNumber, Field(gt=0, le=MAX_STEPS)] = 4_000_000
     wall_clock_budget_s: PositiveFloat | None = None
     checkpoint_interval_s: NonNegativeFloat = 30.0
@@ -347,7 +367,21 @@ def _problems(details: ErrorDetails, source: ConfigSource) -> list[Problem]:
         message = f"{message}; found {_short(found)}"
         if isinstance(found, str) and found.replace("_", "").isdecimal() and "_" in found:
             message += " (write it without '_')"
+    path = _as_written(path, source.content)
     return [Problem(path, message, **source.where(path, of_key=False))]
+
+
+def _as_written(path: FieldPath, content: object) -> FieldPath:
+    """Return the path of a field as the file has it, where it may have a name of before."""
+    models = (TrainingConfig, CloningConfig)
+    former = {new: old for model in models for old, new in model.former_names.items()}
+    written: list[str | int] = []
+    for part in path:
+        known = content if isinstance(content, Mapping) else {}
+        is_former = part not in known and former.get(str(part)) in known
+        written.append(former[str(part)] if is_former else part)
+        content = known.get(written[-1])
+    return tuple(written)
 
 
 def _unknown(path: FieldPath, known: tuple[str, ...], source: ConfigSource) -> Problem:

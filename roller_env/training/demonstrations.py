@@ -22,7 +22,7 @@ from roller_env.replay import Replay, ReplayError, load_replay
 from roller_env.replay.actions import recorded_actions
 from roller_env.replay.experience import Experience, experiences
 from roller_env.replay.file import SUFFIX
-from roller_env.replay.scripted import PLAYER, meant
+from roller_env.replay.scripted import PLAYER, relabelled
 from roller_env.training.config import TrainingConfig
 
 
@@ -113,12 +113,12 @@ def _from_replays(replays: Sequence[Replay], wanted: EnvConfig) -> list[Demonstr
 
 
 def _worth_imitating(experience: Experience, mode: ActionMode) -> npt.NDArray[Any]:
-    """Return an episode's actions; the scripted player can tell what it meant where it slipped."""
+    """Return an episode's actions; those of the scripted player are relabelled: without noise."""
     replay = experience.replay
     if replay.player != PLAYER or replay.level.route is None:
         return experience.actions
     # The episode is without its intro.
-    return recorded_actions(mode, meant(replay)[len(replay) - len(experience) :])
+    return recorded_actions(mode, relabelled(replay)[len(replay) - len(experience) :])
 
 
 def _thinned(demonstration: Demonstration, ratio: float) -> Demonstration:

@@ -31,9 +31,9 @@ from roller_env.training.checkpoint import (
     load_checkpoint,
     save_checkpoint,
 )
+from roller_env.training.curriculum import StartStateCurriculum
 from roller_env.training.files import RunError, RunFiles, only_one_process, write_atomically
 from roller_env.training.ppo import learn, make_environments, new_model
-from roller_env.training.practice import PracticeStarts
 from tests.training.small import UPDATES, small_config
 
 
@@ -60,7 +60,7 @@ def normaliser(model: PPO) -> VecNormalize:
 
 def games(model: PPO) -> Snapshot:
     environments = normaliser(model).venv
-    assert isinstance(environments, PracticeStarts)
+    assert isinstance(environments, StartStateCurriculum)
     return environments.environments.simulation.snapshot()
 
 
@@ -128,7 +128,7 @@ def test_a_checkpoint_of_before_rewards_were_summed_up_is_gone_on_with(
     model, _, newer = trained
     facts, arrays = unpacked(newer)
     sums = [name for name in arrays if name.endswith(("/total_reward", "/reward_terms"))]
-    assert len(sums) == 4, "of the games under way and of those that are practised"
+    assert len(sums) == 4, "of the games under way and of those that are kept"
     for name in sums:
         del arrays[name]
     file = tmp_path / "checkpoint.zip"

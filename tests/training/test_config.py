@@ -258,6 +258,23 @@ def test_an_environment_is_given_as_options_as_a_configuration_or_as_what_was_wr
     assert load_level(elsewhere.evaluation_environment.level) == level
 
 
+def test_names_of_before_are_taken_with_a_warning(tmp_path: Path) -> None:
+    text = "level: flat\npractice_share: 0.25\ncloning: {held_out_share: 0.5}\n"
+    with pytest.warns(DeprecationWarning) as warned:
+        config = load_config(written(tmp_path, text))
+    assert (config.start_state_curriculum, config.cloning.held_out_fraction) == (0.25, 0.5)
+    assert {str(one.message) for one in warned} == {
+        "practice_share is called start_state_curriculum now",
+        "held_out_share is called held_out_fraction now",
+    }
+    assert "share" not in config.to_yaml()
+    wrong = "level: flat\npractice_share: 2\ncloning:\n  held_out_share: 1\n"
+    with pytest.warns(DeprecationWarning), pytest.raises(ConfigError) as caught:
+        load_config(written(tmp_path, wrong))
+    places = [(problem.field, problem.line) for problem in caught.value.problems]
+    assert places == [("practice_share", 2), ("cloning.held_out_share", 4)]
+
+
 def test_what_a_run_of_before_wrote_is_the_same_configuration(tmp_path: Path) -> None:
     """Earlier versions wrote the options as they were given, defaults among them."""
     text = """level: flat
