@@ -260,7 +260,7 @@ def test_an_environment_is_given_as_options_as_a_configuration_or_as_what_was_wr
 
 def test_names_of_before_are_taken_with_a_warning(tmp_path: Path) -> None:
     text = "level: flat\npractice_share: 0.25\ncloning: {held_out_share: 0.5}\n"
-    with pytest.warns(DeprecationWarning) as warned:
+    with pytest.warns(DeprecationWarning, match="is called .* now") as warned:
         config = load_config(written(tmp_path, text))
     assert (config.start_state_curriculum, config.cloning.held_out_fraction) == (0.25, 0.5)
     assert {str(one.message) for one in warned} == {
@@ -269,7 +269,7 @@ def test_names_of_before_are_taken_with_a_warning(tmp_path: Path) -> None:
     }
     assert "share" not in config.to_yaml()
     wrong = "level: flat\npractice_share: 2\ncloning:\n  held_out_share: 1\n"
-    with pytest.warns(DeprecationWarning), pytest.raises(ConfigError) as caught:
+    with pytest.warns(DeprecationWarning, match="now"), pytest.raises(ConfigError) as caught:
         load_config(written(tmp_path, wrong))
     places = [(problem.field, problem.line) for problem in caught.value.problems]
     assert places == [("practice_share", 2), ("cloning.held_out_share", 4)]
