@@ -161,7 +161,7 @@ class ReplaySession:
 
 
 @dataclass(frozen=True)
-class SeekEvent(messages.Event):  # type: ignore[misc]  # MuJoCo comes without types
+class SeekEvent(messages.Event):
     """The person wants to see another moment."""
 
     time_s: float
@@ -183,7 +183,7 @@ class ReplayPlugin(GamePlugin):
         session = cast("GameSession", self.replay_session)
         super().__init__(lambda _: session, choices_of(replay), sound, quality)
 
-    @messages.handler  # type: ignore[untyped-decorator]
+    @messages.handler
     def on_seek(self, event: SeekEvent) -> None:
         """Go where the person wants to."""
         self.replay_session.seek(event.time_s)
