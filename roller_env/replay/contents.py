@@ -18,7 +18,7 @@ from roller_env.config import EnvConfig, make_config
 from roller_env.game.actions import forces
 from roller_env.game.result import EpisodeResult
 from roller_env.game.version import RULES_VERSION
-from roller_env.level import Level, load_level
+from roller_env.level import Level
 from roller_env.physics.version import PHYSICS_VERSION, Engine
 from roller_env.replay.actions import Actions, checked_actions
 from roller_env.replay.checksums import MAX_ROWS, QUANTITIES, Checksums, row_count
@@ -186,9 +186,7 @@ class Replay:
     @property
     def level(self) -> Level:
         """What was played."""
-        level = self.options.level
-        assert isinstance(level, Level)
-        return level
+        return _level_of(self.options)
 
     @cached_property
     def force_n(self) -> Float64:
@@ -220,6 +218,12 @@ class Replay:
         return make_config(**{**self.options.keywords(), **changes})
 
 
+def _level_of(options: EnvConfig) -> Level:
+    """Return the level of options as `recorded_options` has them: checked, and no name."""
+    assert isinstance(options.level, Level)
+    return options.level
+
+
 def canonical_text(level: Level) -> str:
     """Return a level as JSON in metres with every default written out: equal levels, equal text."""
     return level.model_dump_json()
@@ -236,7 +240,7 @@ def check_game(options: EnvConfig, start: tuple[float, float, float], steps: int
     Raises:
         ReplayError: it is too long, or begins where the level does not.
     """
-    level, substeps = load_level(options.level), options.substeps
+    level, substeps = _level_of(options), options.substeps
     if steps > MAX_STEPS or steps * substeps > MAX_PHYSICS_STEPS:
         raise ReplayError(
             f"{steps} control steps of {substeps} physics steps each are too long a replay; "
