@@ -19,7 +19,6 @@ import tyro
 from roller_env.divergence import reports_in
 from roller_env.level.errors import LevelError
 from roller_env.problems import printable, shown
-from roller_env.replay import ReplayError
 from roller_env.training import ConfigError, load_policy
 from roller_env.training.files import RunError, RunFiles
 from roller_env.training.pictures import draw_paths, film_episode
@@ -63,7 +62,7 @@ def main(argv: Sequence[str] | None = None, prog: str | None = None) -> None:
     """
     try:
         _evaluate(tyro.cli(Arguments, args=argv, prog=prog, description=__doc__))
-    except (ConfigError, RunError, LevelError, ReplayError) as error:
+    except (ConfigError, RunError, LevelError) as error:
         sys.exit(f"error: {printable(error)}")
     except OSError as error:
         sys.exit(f"error: {shown(error.filename or 'output')}: {error.strerror or error}")

@@ -218,6 +218,20 @@ class Replay:
         return make_config(**{**self.options.keywords(), **changes})
 
 
+def check_length(options: EnvConfig, steps: int) -> None:
+    """Refuse an episode of more control steps than a replay can have.
+
+    Raises:
+        ReplayError: it is too long.
+    """
+    substeps = options.substeps
+    if steps > MAX_STEPS or steps * substeps > MAX_PHYSICS_STEPS:
+        raise ReplayError(
+            f"{steps} control steps of {substeps} physics steps each are too long a replay; "
+            f"allowed are {MAX_STEPS} control steps and {MAX_PHYSICS_STEPS} physics steps"
+        )
+
+
 def _level_of(options: EnvConfig) -> Level:
     """Return the level of options as `recorded_options` has them: checked, and no name."""
     assert isinstance(options.level, Level)
@@ -240,12 +254,8 @@ def check_game(options: EnvConfig, start: tuple[float, float, float], steps: int
     Raises:
         ReplayError: it is too long, or begins where the level does not.
     """
-    level, substeps = _level_of(options), options.substeps
-    if steps > MAX_STEPS or steps * substeps > MAX_PHYSICS_STEPS:
-        raise ReplayError(
-            f"{steps} control steps of {substeps} physics steps each are too long a replay; "
-            f"allowed are {MAX_STEPS} control steps and {MAX_PHYSICS_STEPS} physics steps"
-        )
+    level = _level_of(options)
+    check_length(options, steps)
     begin, jitter = level.start.at, (*level.start.jitter, 0.0)
     for here, there, most in zip(start, begin, jitter, strict=True):
         # The sum of start and jitter is rounded.

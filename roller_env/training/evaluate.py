@@ -17,7 +17,8 @@ from roller_env.game.actions import forces
 from roller_env.game.result import EpisodeResult
 from roller_env.level.expand import coin_positions
 from roller_env.level.schema import Level
-from roller_env.replay import Recorder, Replay, save_replay
+from roller_env.replay import Recorder, Replay, ReplayError, save_replay
+from roller_env.replay.contents import check_length
 from roller_env.replay.file import SUFFIX
 from roller_env.training.files import RunError
 from roller_env.training.policy import Policy
@@ -118,9 +119,10 @@ def evaluate(
         player: who plays, in words, for whoever reads the replays.
 
     Raises:
-        ReplayError: an episode is longer than a replay can be.
+        RunError: an episode may become longer than a replay can be.
         ValueError: the environments do not reset in the next step.
     """
+    check_recordable(envs)
     if envs.autoreset_mode is not AutoresetMode.NEXT_STEP:
         raise ValueError(f"envs: found {envs.autoreset_mode}; must be {AutoresetMode.NEXT_STEP}")
     observations, _ = envs.reset(seed=seed)
@@ -145,6 +147,22 @@ def evaluate(
         episodes_per_env=episodes_per_env,
         replays=tuple(replay for one in ended for replay in one),
     )
+
+
+def check_recordable(envs: RollerVectorEnv) -> None:
+    """Refuse environments whose episodes may become longer than a replay can be.
+
+    Raises:
+        RunError: they may.
+    """
+    config, level = envs.config, envs.simulation.compiled.level
+    steps = math.ceil(level.time_limit_s / config.control_dt_s)
+    try:
+        check_length(config, min(steps, config.max_episode_steps or steps))
+    except ReplayError as error:
+        raise RunError(
+            f"an evaluation keeps its episodes: {error}; set max_episode_steps"
+        ) from None
 
 
 def envs_and_repeats(episodes: int) -> tuple[int, int]:

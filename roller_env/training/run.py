@@ -23,7 +23,7 @@ from roller_env.training.behaviour_cloning import start_from_demonstrations
 from roller_env.training.checkpoint import CheckpointError, Progress, load_checkpoint
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.demonstrations import Demonstration, load_demonstrations
-from roller_env.training.evaluate import Evaluation, envs_and_repeats, evaluate
+from roller_env.training.evaluate import Evaluation, check_recordable, envs_and_repeats, evaluate
 from roller_env.training.files import (
     RunError,
     RunFiles,
@@ -97,10 +97,15 @@ def check_playable(config: TrainingConfig) -> None:
 
     Raises:
         LevelError: the level cannot be used.
-        ValueError: an option cannot.
+        RunError: the evaluation's episodes cannot be kept.
+        ValueError: an option cannot be used.
     """
-    for environment in (config.environment, config.evaluation_environment):
-        RollerVectorEnv(1, **environment.keywords()).close()
+    RollerVectorEnv(1, **config.environment.keywords()).close()
+    judged = RollerVectorEnv(1, **config.evaluation_environment.keywords())
+    try:
+        check_recordable(judged)
+    finally:
+        judged.close()
 
 
 def _train(

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from roller_env.envs.spaces import Observations
 from roller_env.envs.vector import RollerVectorEnv
+from roller_env.level import load_level
 from roller_env.replay import load_replay, verify
 from roller_env.training.evaluate import (
     MAX_ENVS,
@@ -156,3 +157,12 @@ def test_environments_that_do_not_leave_the_end_to_be_recorded_are_refused() -> 
     envs = RollerVectorEnv(2, level="flat", autoreset_mode="SAME_STEP")
     with pytest.raises(ValueError, match=r"envs: found .*SAME_STEP; must be .*NEXT_STEP"):
         evaluate(each_row_another_way, envs, seed=0)
+
+
+def test_episodes_that_no_replay_can_hold_are_refused_before_they_are_played() -> None:
+    level = load_level("flat").model_copy(update={"time_limit_s": 86_400.0})
+    envs = RollerVectorEnv(2, level=level)
+    with pytest.raises(RunError, match=r"1728000 control steps .*; set max_episode_steps"):
+        evaluate(each_row_another_way, envs, seed=0)
+    envs = RollerVectorEnv(2, level=level, max_episode_steps=4)
+    assert len(evaluate(each_row_another_way, envs, seed=0)) == 2
