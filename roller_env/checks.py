@@ -7,11 +7,12 @@ is not 1. Every error reads ``name: found X; must be Y`` or ``name: found X; all
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import MISSING, fields
-from difflib import get_close_matches
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Any, TypeGuard, TypeVar
+from typing import TYPE_CHECKING, Any, TypeGuard, TypeVar, cast
+
+from roller_env import names
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -19,7 +20,42 @@ if TYPE_CHECKING:
 _Choice = TypeVar("_Choice", bound=str | int | None)
 _Record = TypeVar("_Record", bound="DataclassInstance")
 
-_LONG_TEXT = 64
+
+class Refused(ValueError):
+    """Values that are not allowed.
+
+    Attributes:
+        messages: one for each, as this module words them.
+    """
+
+    def __init__(self, messages: Sequence[str]) -> None:
+        self.messages = tuple(messages)
+        super().__init__("\n".join(self.messages))
+
+
+def each(checked: Mapping[str, Callable[[], Any]]) -> dict[str, Any]:
+    """Return what each of the checks returns, by its name, having asked all of them.
+
+    Raises:
+        ValueError: the only one that was raised, or a `Refused` with the messages of all.
+    """
+    found: dict[str, Any] = {}
+    errors: list[ValueError] = []
+    for name, check in checked.items():
+        try:
+            found[name] = check()
+        except ValueError as error:
+            errors.append(error)
+    if len(errors) == 1:
+        raise errors[0]
+    if errors:
+        raise Refused([message for error in errors for message in messages_of(error)])
+    return found
+
+
+def messages_of(error: ValueError) -> tuple[str, ...]:
+    """Return what an error says of each value that it refuses."""
+    return error.messages if isinstance(error, Refused) else (str(error),)
 
 
 def one_of(name: str, value: object, allowed: Collection[_Choice]) -> _Choice:
@@ -95,29 +131,36 @@ def record(name: str, kind: type[_Record], value: object) -> _Record:
             f"{name}: found {value!r}; must be a {kind.__name__} or a mapping with its fields "
             f"{', '.join(known)}"
         )
-    known_names(name, value, known)
     missing = [field for field, is_needed in known.items() if is_needed and field not in value]
     if missing:
+        known_names(name, value, known)
         raise ValueError(f"{name}: found no {' and no '.join(missing)}; must have it")
-    return kind(**value)
+    made = each(
+        {
+            "names": lambda: known_names(name, value, known),
+            "record": lambda: kind(**{key: value[key] for key in known if key in value}),
+        }
+    )
+    return cast("_Record", made["record"])
 
 
 def known_names(name: str, given: Mapping[Any, object], known: Collection[str]) -> None:
     """Refuse a mapping with other keys than ``known``.
 
     Raises:
-        ValueError: it has one; the message says which there are and which is nearest.
+        ValueError: it has one or more; a message each says which there are and which is nearest.
     """
-    for key in given:
-        if key not in known:
-            raise ValueError(
-                f"{name}: found the unknown key {key!r}; allowed are {', '.join(known)}"
-                f"{nearest(str(key), known)}"
-            )
+    unknown = [
+        f"{name}: found the unknown key {key!r}; allowed are {', '.join(known)}"
+        f"{nearest(str(key), known)}"
+        for key in given
+        if key not in known
+    ]
+    if unknown:
+        raise Refused(unknown)
 
 
 def nearest(written: str, known: Collection[str]) -> str:
     """Return ``; did you mean 'X'?``, or nothing where no known name is near."""
-    lower = {name.lower(): name for name in known}
-    near = get_close_matches(written[:_LONG_TEXT].lower(), lower, n=1)
-    return f"; did you mean {lower[near[0]]!r}?" if near else ""
+    near = names.nearest(written, known)
+    return f"; did you mean {near!r}?" if near is not None else ""

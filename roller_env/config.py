@@ -26,6 +26,10 @@ MAX_PICTURE_EDGE: Final = 4096
 MAX_ENVS: Final = 10**6
 
 
+_NOT_OF_AN_EPISODE: Final = ("level", "camera", "render_mode", "width", "height", "num_threads")
+"""Options by which neither a game's steps change nor what its agent is paid."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class EnvConfig:
     """Options of `gymnasium.make("Roller/...", **options)` and of `RollerVecEnv`.
@@ -52,7 +56,7 @@ class EnvConfig:
         num_threads: native threads of a vector environment; 0 means one for each CPU.
 
     Raises:
-        ValueError: an option's value is not allowed; the message says what is.
+        ValueError: options' values are not allowed; a line for each says what is.
     """
 
     level: LevelSource = "classic"
@@ -72,64 +76,79 @@ class EnvConfig:
 
     def __post_init__(self) -> None:
         """Check every option, and the control step against the physics step."""
-        checked = {
-            "level": _level(self.level),
-            "action": checks.one_of("action", self.action, get_args(ActionMode)),
-            "observation": checks.one_of(
-                "observation", self.observation, get_args(ObservationMode)
-            ),
-            "reward": checks.one_of("reward", self.reward, get_args(RewardMode)),
-            "reward_weights": checks.record("reward_weights", RewardWeights, self.reward_weights),
-            "discount": checks.number("discount", self.discount, 0.0, 1.0, "a number from 0 to 1"),
-            "physics": _physics(self.physics),
-            "camera": checks.one_of("camera", self.camera, ("game", *range(len(MODES)))),
-            "render_mode": checks.one_of(
-                "render_mode", self.render_mode, (None, *get_args(RenderMode))
-            ),
-            "width": checks.whole("width", self.width, 16, MAX_PICTURE_EDGE),
-            "height": checks.whole("height", self.height, 16, MAX_PICTURE_EDGE),
-            "num_threads": checks.whole("num_threads", self.num_threads, 0, 4096),
-        }
-        if self.max_episode_steps is not None:
-            checked["max_episode_steps"] = checks.whole(
-                "max_episode_steps", self.max_episode_steps, 1, 10**9
-            )
+        one_of, whole = checks.one_of, checks.whole
+        checked = checks.each(
+            {
+                "level": lambda: _level(self.level),
+                "action": lambda: one_of("action", self.action, get_args(ActionMode)),
+                "observation": lambda: one_of(
+                    "observation", self.observation, get_args(ObservationMode)
+                ),
+                "reward": lambda: one_of("reward", self.reward, get_args(RewardMode)),
+                "reward_weights": lambda: checks.record(
+                    "reward_weights", RewardWeights, self.reward_weights
+                ),
+                "discount": lambda: checks.number(
+                    "discount", self.discount, 0.0, 1.0, "a number from 0 to 1"
+                ),
+                "control_dt_s": lambda: _control_dt(self.control_dt_s, self.physics),
+                "physics": lambda: _physics(self.physics),
+                "max_episode_steps": lambda: (
+                    self.max_episode_steps
+                    if self.max_episode_steps is None
+                    else whole("max_episode_steps", self.max_episode_steps, 1, 10**9)
+                ),
+                "camera": lambda: one_of("camera", self.camera, ("game", *range(len(MODES)))),
+                "render_mode": lambda: one_of(
+                    "render_mode", self.render_mode, (None, *get_args(RenderMode))
+                ),
+                "width": lambda: whole("width", self.width, 16, MAX_PICTURE_EDGE),
+                "height": lambda: whole("height", self.height, 16, MAX_PICTURE_EDGE),
+                "num_threads": lambda: whole("num_threads", self.num_threads, 0, 4096),
+            }
+        )
         for name, value in checked.items():
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "control_dt_s", self._checked_control_dt())
 
-    def _checked_control_dt(self) -> float:
-        step = physics_preset(self.physics).dt_s
-        seconds = "a number of seconds more than 0 and at most 1"
-        control_dt_s = checks.number(
-            "control_dt_s", self.control_dt_s, sys.float_info.min, 1.0, seconds
-        )
-        multiple = control_dt_s / step
-        if round(multiple) < 1 or abs(multiple - round(multiple)) > 1e-6:
-            nearest = max(round(multiple), 1) * step
-            raise ValueError(
-                f"control_dt_s: found {control_dt_s:g}, which is no multiple of the physics "
-                f"step {step:g}; the nearest is {nearest:.10g}"
-            )
-        return control_dt_s
+    @property
+    def preset(self) -> PhysicsPreset:
+        """The physics settings, whether they were given by name or whole."""
+        return physics_preset(self.physics)
 
     @property
     def substeps(self) -> int:
         """Physics steps in a control step."""
-        return round(self.control_dt_s / physics_preset(self.physics).dt_s)
+        return round(self.control_dt_s / self.preset.dt_s)
+
+    def keywords(self) -> dict[str, Any]:
+        """Return every option by name, as the environments' constructors take them."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def to_json(self) -> dict[str, JsonValue]:
         """Return every option as a plain JSON value.
 
         ``make_config(**config.to_json())`` is an equal configuration.
         """
-        options: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
+        options = self.keywords()
         options["reward_weights"] = asdict(self.reward_weights)
         if isinstance(self.level, Level):
             options["level"] = self.level.model_dump(mode="json", exclude_defaults=True)
         if isinstance(self.physics, PhysicsPreset):
             options["physics"] = asdict(self.physics)
         return options
+
+    def differences(self, other: EnvConfig) -> dict[str, JsonValue]:
+        """Return, as plain JSON values, the options that are not the same in the other."""
+        theirs = other.to_json()
+        return {name: mine for name, mine in self.to_json().items() if mine != theirs[name]}
+
+    def episode_options(self) -> dict[str, JsonValue]:
+        """Return, as plain JSON values, what an episode depends on beside the level.
+
+        The preset is among them whole, so that they outlive a change of what its name stands for.
+        """
+        options = self.to_json() | {"physics": asdict(self.preset)}
+        return {name: v for name, v in options.items() if name not in _NOT_OF_AN_EPISODE}
 
 
 def make_config(**options: Any) -> EnvConfig:
@@ -171,3 +190,21 @@ def _physics(physics: object) -> str | PhysicsPreset:
     if isinstance(physics, PhysicsPreset | Mapping):
         return checks.record("physics", PhysicsPreset, physics)
     return checks.one_of("physics", physics, tuple(PRESETS))
+
+
+def _control_dt(value: object, physics: object) -> float:
+    """Return a length of the control step that is a multiple of the physics'."""
+    seconds = "a number of seconds more than 0 and at most 1"
+    control_dt_s = checks.number("control_dt_s", value, sys.float_info.min, 1.0, seconds)
+    try:
+        step = physics_preset(_physics(physics)).dt_s
+    except ValueError:  # told of the physics itself
+        return control_dt_s
+    multiple = control_dt_s / step
+    if round(multiple) < 1 or abs(multiple - round(multiple)) > 1e-6:
+        nearest = max(round(multiple), 1) * step
+        raise ValueError(
+            f"control_dt_s: found {control_dt_s:g}, which is no multiple of the physics "
+            f"step {step:g}; the nearest is {nearest:.10g}"
+        )
+    return control_dt_s

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
+
+from roller_env import names
 
 FieldPath = tuple[str | int, ...]
 """Where in a file something stands, as pydantic writes it: ``("coins", 3, "line", "count")``."""
@@ -20,7 +21,6 @@ MAX_PROBLEMS_PRINTED: Final = 50
 _PLAIN_KEY: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,63}")
 _LONG_TEXT: Final = 64
 _LONG_LIST: Final = 20
-_MANY_NAMES: Final = 1_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +53,7 @@ class Problem:
     @property
     def nearest(self) -> str | None:
         """The known name that is nearest to the written one, if any is near."""
-        if len(self.written) > _LONG_TEXT or len(self.known) > _MANY_NAMES:
-            return None
-        lower = {name.lower(): name for name in self.known}
-        near = difflib.get_close_matches(self.written.lower(), lower, n=1, cutoff=0.6)
-        return lower[near[0]] if near else None
+        return names.nearest(self.written, self.known)
 
     @property
     def where(self) -> str:

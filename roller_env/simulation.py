@@ -17,6 +17,7 @@ from roller_env.config import MAX_ENVS, EnvConfig
 from roller_env.divergence import report
 from roller_env.game import observations, step
 from roller_env.game.bodies import Bodies, Columns
+from roller_env.game.result import REWARD_TERMS, EpisodeResult
 from roller_env.game.state import GameState, score_percent
 from roller_env.game.step import Games, Rewarding
 from roller_env.game.tables import LevelTable
@@ -267,9 +268,7 @@ class Simulation:
     def results(self, rows: Int64 | None = None) -> dict[str, npt.NDArray[Any]]:
         """Return how the games in ``rows`` (all, if None) stand, arrays of (n,) by name.
 
-        ``success`` (the finish was reached), ``score_percent`` (coins of the level's, 0 to 100;
-        without coins 100 for the finish), ``coins`` (collected), ``time_s``, ``fall`` and
-        ``diverged``.
+        They are the fields of `EpisodeResult`, of which ``reward_terms`` is (n, 4).
         """
         every: Int64 | slice = slice(None) if rows is None else rows
         coins, finished = self.state.coins[every], self.state.finished[every]
@@ -280,7 +279,16 @@ class Simulation:
             "time_s": self.time_s[every],
             "fall": self.state.fallen[every].copy(),
             "diverged": self.state.diverged[every].copy(),
+            "truncated": self.state.truncated[every].copy(),
+            "total_reward": self.state.total_reward[every].copy(),
+            "reward_terms": self.state.reward_terms[every].copy(),
         }
+
+    def result(self, row: int = 0) -> EpisodeResult:
+        """Return how the game in a row stands."""
+        values = {name: found[0].tolist() for name, found in self.results(np.array([row])).items()}
+        terms = dict(zip(REWARD_TERMS, values.pop("reward_terms"), strict=True))
+        return EpisodeResult(**values, reward_terms=terms)
 
     # What changes it -------------------------------------------------------------------------
 

@@ -9,13 +9,14 @@ Examples::
 
     python scripts/make_demonstrations.py
     python scripts/make_demonstrations.py --rerecord
-    python scripts/make_demonstrations.py classic --episodes 40 --slips 0.1 --output demonstrations
+    python scripts/make_demonstrations.py classic --episodes 40 --action-noise 0.1 --output demos
 """
 
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass, field
+import warnings
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -23,7 +24,7 @@ import tyro
 from tqdm import tqdm
 
 from roller_env.assets import asset_directory
-from roller_env.config import EnvConfig, make_config
+from roller_env.config import EnvConfig
 from roller_env.level import Level, LevelError, load_level, shipped_levels
 from roller_env.problems import printable
 from roller_env.replay import (
@@ -57,8 +58,11 @@ class Arguments:
     seed: int = 0
     """Of the first one's start; the others follow."""
 
-    slips: float = 0.0
-    """Share of the time in which it holds any keys at all, from which it then has to recover."""
+    action_noise: float = 0.0
+    """Fraction of the time in which it holds any keys at all, from which it then has to recover."""
+
+    slips: Annotated[float | None, tyro.conf.arg(help_behavior_hint="deprecated")] = None
+    """What --action-noise was called."""
 
     physics: str = "default"
     """Preset to play with."""
@@ -67,6 +71,9 @@ class Arguments:
 def main(arguments: Arguments) -> int:
     """Do what the command line says; return the exit status, 1 if an episode did not end well."""
     failed = 0
+    if arguments.slips is not None:
+        warnings.warn("--slips is called --action-noise now", DeprecationWarning, stacklevel=2)
+        arguments = replace(arguments, action_noise=arguments.slips, slips=None)
     for source in arguments.levels or shipped_levels():
         level = load_level(source)
         numbers = range(arguments.seed, arguments.seed + arguments.episodes)
@@ -74,8 +81,8 @@ def main(arguments: Arguments) -> int:
             failed += not demonstrate(level, seed, arguments)
     if failed:
         print(f"{failed} were not kept", file=sys.stderr)
-    # Recovering from slips does not always succeed, and need not.
-    return 1 if failed and arguments.slips == 0.0 else 0
+    # Recovering from noise does not always succeed, and need not.
+    return 1 if failed and arguments.action_noise == 0.0 else 0
 
 
 def demonstrate(level: Level, seed: int, arguments: Arguments) -> bool:
@@ -90,7 +97,7 @@ def demonstrate(level: Level, seed: int, arguments: Arguments) -> bool:
             tqdm.write(f"{error}; not kept")
             return False
     else:
-        player = ScriptedPlayer(level, slips=arguments.slips, seed=seed)
+        player = ScriptedPlayer(level, action_noise=arguments.action_noise, seed=seed)
         replay = record_episode(config, player, seed=seed, player=PLAYER)
     result = replay.result
     told = (
@@ -112,8 +119,7 @@ def play_again(file: Path, config: EnvConfig) -> Replay:
         ReplayError: it cannot be read, or its game ends otherwise now.
     """
     played = load_any(file)
-    options = played.options.keywords() | {"physics": config.physics}
-    return record_anew(played, make_config(level=config.level, num_threads=1, **options))
+    return record_anew(played, replace(played.options, level=config.level, physics=config.physics))
 
 
 if __name__ == "__main__":

@@ -21,10 +21,9 @@ from roller_env.level.errors import LevelError
 from roller_env.problems import printable, shown
 from roller_env.training import ConfigError, load_policy
 from roller_env.training.files import RunError, RunFiles
-from roller_env.training.pictures import draw_paths, record_video
-from roller_env.training.replays import save_replays
+from roller_env.training.pictures import draw_paths, film_episode
 from roller_env.training.report import markdown_table, write_evaluation
-from roller_env.training.run import evaluate_policy
+from roller_env.training.run import evaluate_policy, player_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,12 +72,14 @@ def _evaluate(arguments: Arguments) -> None:
     policy = load_policy(arguments.run, trust=arguments.trust)
     config = policy.config
     if arguments.level is not None:
-        config = config.model_copy(update={"level": arguments.level})
+        config = config.on_level(arguments.level)
     with reports_in(arguments.output or arguments.run):
-        evaluation = evaluate_policy(policy, config, arguments.episodes, arguments.seed)
+        evaluation = evaluate_policy(
+            policy, config, arguments.episodes, arguments.seed, player_of(arguments.run)
+        )
     print(markdown_table(evaluation, config))
     if arguments.replays is not None:
-        save_replays(evaluation, config, arguments.replays, f"policy {arguments.run.name}")
+        evaluation.save_replays(arguments.replays)
         print(f"{len(evaluation)} replays written to {shown(arguments.replays)}")
     if arguments.output is None:
         return
@@ -86,5 +87,5 @@ def _evaluate(arguments: Arguments) -> None:
     files = RunFiles(arguments.output)
     write_evaluation(evaluation, config, files)
     draw_paths(evaluation, files.paths)
-    record_video(policy, config, evaluation.seed, files.video)
+    film_episode(evaluation, files.video)
     print(f"written to {shown(arguments.output)}")

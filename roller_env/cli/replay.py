@@ -186,7 +186,7 @@ def _check(arguments: Arguments) -> None:
 
 def about(replay: Replay) -> str:
     """Return what a replay is, in a line, and in more what a reader may be wrong about."""
-    result, level, preset = replay.result, replay.level, replay.options.physics
+    result, level, preset = replay.result, replay.level, replay.options.preset
     player = printable(replay.player) or "unknown player"
     lines = [
         f"{level.name}: {player}, {len(replay)} steps, "

@@ -6,11 +6,11 @@ import weakref
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import UInt8
 from roller_env.drawing.opengl import current, free, new_context
 
-Picture = npt.NDArray[np.uint8]
+Picture = UInt8
 
 
 class Canvas:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Float64
 from roller_env.drawing.canvas import Canvas, Picture
 from roller_env.drawing.renderer import look
 from roller_env.drawing.stage import Stage
@@ -18,8 +18,6 @@ from roller_env.game.tables import LevelTable
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
 from roller_env.physics.presets import physics_preset
-
-Float64 = npt.NDArray[np.float64]
 
 SHADOW_PIXELS: Final = 8192
 """Edge of the picture that shadows are made from: here it has to cover the level."""

@@ -7,8 +7,8 @@ from typing import Any, Final, Literal
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Float64
 from roller_env.drawing.canvas import Canvas, Picture
 from roller_env.drawing.opengl import DrawingUnavailable, drawing
 from roller_env.drawing.stage import Stage
@@ -21,8 +21,6 @@ from roller_env.game.cameras import (
 from roller_env.simulation import Simulation
 
 __all__ = ["DrawingUnavailable", "GameRenderer"]
-
-Float64 = npt.NDArray[np.float64]
 
 FIELD_OF_VIEW_DEG: Final = 65.0
 """Vertical: at 2.5 m behind and 2 m above the ball it shows the way ahead and what is beside it."""

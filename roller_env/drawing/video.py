@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from itertools import chain
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
 from roller_env.drawing.canvas import Picture
-from roller_env.drawing.renderer import GameRenderer
 from roller_env.game.state import COIN_ON_PANELS
 from roller_env.simulation import Simulation
-
-Float64 = npt.NDArray[np.float64]
-
-END_S: Final = 1.0
-"""How long a film of an episode stands still at its end."""
 
 _MP4_QUALITY: Final = 8
 """On imageio-ffmpeg's scale from 0 to 10; below 7 the chequered floors smear."""
@@ -86,64 +79,15 @@ def _write_gif(first: Picture, others: Iterator[Picture], file: Path, fps: int) 
     )
 
 
-def record_episode(
-    simulation: Simulation,
-    act: Callable[[Simulation], Float64],
-    file: Path,
-    camera: int | Literal["game"] = "game",
-    size: tuple[int, int] = (480, 320),
-) -> Path:
-    """Film the game in row 0, from how it stands now to its end.
-
-    Args:
-        simulation: the games; all are stepped until that in row 0 is over.
-        act: gives the keys' force, (N, 2) newtons, for the next step.
-        file: where to; see `write_video`.
-        camera: a camera mode, or "game" for the one that the game sets.
-        size: width and height in pixels, both even.
-
-    Returns:
-        The path written.
-
-    Raises:
-        DrawingUnavailable: there is no OpenGL here.
-    """
-    fps = round(1.0 / simulation.duration_s)
-    renderer = GameRenderer(simulation, *size)
-    try:
-        return write_video(_frames(simulation, act, renderer, camera, fps), file, fps)
-    finally:
-        renderer.close()
-
-
-def _frames(
-    simulation: Simulation,
-    act: Callable[[Simulation], Float64],
-    renderer: GameRenderer,
-    camera: int | Literal["game"],
-    fps: int,
-) -> Iterator[Picture]:
-    frame = with_panel(renderer.render(0, camera), simulation)
-    yield frame
-    while not simulation.state.over[0]:
-        simulation.step(act(simulation))
-        frame = with_panel(renderer.render(0, camera), simulation)
-        yield frame
-    for _ in range(round(END_S * fps)):
-        yield frame
-
-
 def panel_lines(simulation: Simulation, row: int = 0) -> list[str]:
     """Return what the panel says of a game: points, coins and time, and how it ended."""
-    results = {name: values[0] for name, values in simulation.results(np.array([row])).items()}
-    coins, coins_in_level = results["coins"], simulation.coins_in_level[row]
+    result = simulation.result(row)
     lines = [
-        f"{COIN_ON_PANELS * coins} points   {results['time_s']:.1f} s",
-        f"{coins} of {coins_in_level} coins",
+        f"{COIN_ON_PANELS * result.coins} points   {result.time_s:.1f} s",
+        f"{result.coins} of {simulation.coins_in_level[row]} coins",
     ]
     if simulation.state.over[row]:
-        end = "finish" if results["success"] else "fall" if results["fall"] else "time up"
-        lines.append(f"{end}: {results['score_percent']:.0f} %")
+        lines.append(f"{result.outcome}: {result.score_percent:.0f} %")
     return lines
 
 

@@ -9,13 +9,10 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.arrays import Bool, Float64, Int64
 from roller_env.checks import is_whole, known_names
 from roller_env.pieces.coin import COIN
 from roller_env.simulation import Placement, Simulation, Snapshot
-
-Bool = npt.NDArray[np.bool_]
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 RESET_MASK: Final = "reset_mask"
 OPTIONS: Final = ("intro", "state", "position", "velocity", "angular_velocity", "coins")

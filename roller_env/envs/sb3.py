@@ -15,6 +15,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
+from roller_env.arrays import Float64, Int64, UInt8
 from roller_env.checks import is_whole, nearest
 from roller_env.envs.arguments import seed_of
 from roller_env.envs.infos import rows_of, vector_info
@@ -38,8 +39,8 @@ class VecSnapshot:
     """
 
     games: Snapshot
-    returns: npt.NDArray[np.float64]
-    lengths: npt.NDArray[np.int64]
+    returns: Float64
+    lengths: Int64
 
 
 class RollerVecEnv(VecEnv):
@@ -151,7 +152,7 @@ class RollerVecEnv(VecEnv):
     def _end_episodes(
         self,
         infos: list[dict[str, Any]],
-        rows: npt.NDArray[np.int64],
+        rows: Int64,
         told: dict[str, Any],
     ) -> None:
         """Write what SB3 expects at an episode's end, and begin the next one's count."""
@@ -297,7 +298,7 @@ class RollerVecEnv(VecEnv):
         seeds = [seed if chosen else None for chosen in mask]
         return self.vector.reset(seed=seeds, options={**(options or {}), "reset_mask": mask})
 
-    def _picture_or_warning(self, row: int) -> npt.NDArray[np.uint8] | None:
+    def _picture_or_warning(self, row: int) -> UInt8 | None:
         """Return a row's picture if there is a render mode; else warn, as `RollerEnv.render`."""
         if self.vector.render_mode is None:
             self.vector.render()
@@ -313,7 +314,7 @@ class RollerVecEnv(VecEnv):
         """
         return [issubclass(Monitor, wrapper_class) for _ in self._rows(indices)]
 
-    def get_images(self) -> Sequence[npt.NDArray[np.uint8] | None]:
+    def get_images(self) -> Sequence[UInt8 | None]:
         """Return a picture of every row; None for each without a render mode."""
         if self.vector.render_mode is None:
             return [None] * self.num_envs

@@ -6,9 +6,9 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-import numpy.typing as npt
 from gymnasium.envs.registration import EnvSpec
 
+from roller_env.arrays import UInt8
 from roller_env.config import EnvConfig, make_config
 from roller_env.drawing.renderer import GameRenderer
 from roller_env.envs import spaces
@@ -120,7 +120,7 @@ class RollerEnv(gym.Env[Any, Any]):
         """
         self.simulation.restore(state, np.array([0]))
 
-    def render(self) -> npt.NDArray[np.uint8] | None:
+    def render(self) -> UInt8 | None:
         """Return a picture, (height, width, 3) uint8, or None without a render mode."""
         if self.render_mode is None:
             gym.logger.warn("render: make the environment with render_mode='rgb_array'")
@@ -147,7 +147,7 @@ class RollerEnv(gym.Env[Any, Any]):
             return self._picture()
         return spaces.shape_observation(self.config, self.simulation.observe()[0])
 
-    def _picture(self) -> npt.NDArray[np.uint8]:
+    def _picture(self) -> UInt8:
         if self._renderer is None:
             self._renderer = GameRenderer(self.simulation, self.config.width, self.config.height)
         return self._renderer.render(0, self.config.camera)

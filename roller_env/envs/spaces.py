@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast, get_args
 
 import gymnasium as gym
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Float32
 from roller_env.config import EnvConfig
-from roller_env.game import actions, observations
-from roller_env.game.actions import DIRECTIONS, KEYS, ActionMode
+from roller_env.game import observations
+from roller_env.game.actions import (
+    COMBINATIONS,
+    DIRECTIONS,
+    KEYS,
+    ActionMode,
+    action_of_keys,
+)
 
 Space = gym.Space[Any]
+Observations = Float32 | dict[str, Float32]
+"""Of many envs, with a leading axis of them; a dict of entries with the ``dict`` observation."""
 
 
 def action_space(config: EnvConfig) -> Space:
@@ -22,6 +30,14 @@ def action_space(config: EnvConfig) -> Space:
     if config.action == "keys":
         return gym.spaces.MultiBinary(len(KEYS))
     return gym.spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+
+def action_mode(space: Space) -> ActionMode | None:
+    """Return the mode whose action space this is; None if it is none of this game's."""
+    for mode in get_args(ActionMode):
+        if space == action_space(EnvConfig(action=mode)):
+            return cast("ActionMode", mode)
+    return None
 
 
 def observation_space(config: EnvConfig) -> Space:
@@ -40,7 +56,7 @@ def observation_space(config: EnvConfig) -> Space:
     return gym.spaces.flatten_space(gym.spaces.Tuple(list(boxes.values())))
 
 
-def shape_observation(config: EnvConfig, vectors: npt.NDArray[np.float32]) -> Any:
+def shape_observation(config: EnvConfig, vectors: Float32) -> Any:
     """Return observation vectors, (..., size), in the shape of the configured mode."""
     if config.observation == "dict":
         return observations.split(vectors, observations.entries("dict"))
@@ -54,28 +70,9 @@ def row_of(observation: Any, row: int) -> Any:
     return observation[row].copy()
 
 
-def action_of_keys(mode: ActionMode, held: str) -> Any:
-    """Return the action that holding the keys in ``held``, letters of "wasd", stands for.
-
-    Opposite keys cancel.
-    """
-    keys = actions.held_keys(held)
-    if mode == "keys":
-        return keys
-    push = keys @ actions.KEY_AXES
-    if mode == "force":
-        return push.astype(np.float32)
-    pushes = np.array([actions.held_keys(name) @ actions.KEY_AXES for name in DIRECTIONS])
-    return int(np.flatnonzero((pushes == push).all(axis=1))[0])
-
-
 def keys_to_action(mode: ActionMode) -> dict[tuple[str, ...], Any]:
     """Return every combination of held keys with its action, as `gymnasium.utils.play` takes it.
 
     It refuses a combination of no keys, and takes that action as its ``noop``.
     """
-    combinations: dict[tuple[str, ...], Any] = {}
-    for bits in range(1, 2 ** len(KEYS)):
-        held = [key for index, key in enumerate(KEYS) if bits >> index & 1]
-        combinations[tuple(held)] = action_of_keys(mode, "".join(held))
-    return combinations
+    return {tuple(held): action_of_keys(mode, held) for held in COMBINATIONS if held}

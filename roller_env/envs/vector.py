@@ -13,6 +13,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
+from roller_env.arrays import Bool, Float64, Int64, UInt8
 from roller_env.checks import nearest
 from roller_env.config import EnvConfig, make_config
 from roller_env.drawing.renderer import GameRenderer
@@ -22,10 +23,6 @@ from roller_env.envs.infos import vector_info
 from roller_env.envs.specs import plain_spec
 from roller_env.game.actions import forces
 from roller_env.simulation import Simulation, Snapshot
-
-Bool = npt.NDArray[np.bool_]
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 
 class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
@@ -164,14 +161,14 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         every = np.arange(self.num_envs) if rows is None else np.asarray(rows)
         self.simulation.restore(state, every)
 
-    def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
+    def render(self) -> tuple[UInt8, ...] | None:
         """Return a picture of every row, or None without a render mode."""
         if self.render_mode is None:
             gym.logger.warn("render: make the environment with render_mode='rgb_array'")
             return None
         return tuple(self.picture(row) for row in range(self.num_envs))
 
-    def picture(self, row: int) -> npt.NDArray[np.uint8]:
+    def picture(self, row: int) -> UInt8:
         """Return a picture of one row, (height, width, 3) uint8."""
         if self._renderer is None:
             self._renderer = GameRenderer(self.simulation, self.config.width, self.config.height)

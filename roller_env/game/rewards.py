@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Literal, NamedTuple
+from functools import partial
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from roller_env import checks
 from roller_env.arrays import Float64, Int64
 from roller_env.compiled import device_function
+from roller_env.game.result import REWARD_TERMS
 
 RewardMode = Literal["points", "shaped"]
 
@@ -34,18 +36,19 @@ class RewardWeights:
 
     def __post_init__(self) -> None:
         """Refuse weights that are not finite numbers."""
-        for name in self.__slots__:
-            value = checks.number(f"reward_weights.{name}", getattr(self, name))
+        checked = checks.each(
+            {
+                name: partial(checks.number, f"reward_weights.{name}", getattr(self, name))
+                for name in REWARD_TERMS
+            }
+        )
+        for name, value in checked.items():
             object.__setattr__(self, name, value)
 
     @property
     def terms(self) -> tuple[float, float, float, float]:
-        """The weights in the order of `TERMS`."""
+        """The weights by `REWARD_TERMS`."""
         return (self.coin, self.finish, self.fall, self.progress)
-
-
-TERMS: Final = ("coin", "finish", "fall", "progress")
-"""What a reward is the sum of: each of the weights times what happened, and the shaping."""
 
 
 class ShapingState(NamedTuple):

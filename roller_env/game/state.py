@@ -11,7 +11,8 @@ import numpy.typing as npt
 from roller_env.arrays import Bool, Float64, Int64
 from roller_env.game.cameras import CameraState
 from roller_env.game.kinds import RULES
-from roller_env.game.rewards import TERMS, ShapingState
+from roller_env.game.result import REWARD_TERMS
+from roller_env.game.rewards import ShapingState
 from roller_env.game.tables import LevelTable
 from roller_env.pieces.coin import COIN
 from roller_env.pieces.rules import Rules, StateT
@@ -33,7 +34,8 @@ class GameState(NamedTuple):
         fallen: (N,) the ball has fallen below the kill height.
         diverged: (N,) the physics failed.
         truncated: (N,) the time is up.
-        earned: (N, terms) what the episode has earned so far, by `roller_env.game.rewards.TERMS`.
+        total_reward: (N,) sum of the rewards since the episode began.
+        reward_terms: (N, terms) of which sums that is one: of each of `REWARD_TERMS`.
         camera: what the cameras own.
         shaping: what the shaping of the reward owns.
         kinds: what each kind of piece owns; see `of`.
@@ -47,7 +49,8 @@ class GameState(NamedTuple):
     fallen: Bool
     diverged: Bool
     truncated: Bool
-    earned: Float64
+    total_reward: Float64
+    reward_terms: Float64
     camera: CameraState
     shaping: ShapingState
     kinds: tuple[Any, ...]
@@ -68,7 +71,8 @@ class GameState(NamedTuple):
             fallen=flags(),
             diverged=flags(),
             truncated=flags(),
-            earned=np.zeros((num_envs, len(TERMS))),
+            total_reward=np.zeros(num_envs),
+            reward_terms=np.zeros((num_envs, len(REWARD_TERMS))),
             camera=CameraState.initial(num_envs),
             shaping=ShapingState.initial(num_envs),
             kinds=tuple(

@@ -20,7 +20,8 @@ from roller_env.game.bodies import Columns
 from roller_env.game.cameras import settle
 from roller_env.game.kinds import all_hooks
 from roller_env.game.observations import STATE_SIZE, rotated
-from roller_env.game.rewards import TERMS, ShapingState, next_waypoint, route_progress, shaping
+from roller_env.game.result import REWARD_TERMS
+from roller_env.game.rewards import ShapingState, next_waypoint, route_progress, shaping
 from roller_env.game.slabs import lowering
 from roller_env.game.state import GameState
 from roller_env.game.tables import LevelTable, Movers, Regions, Routes
@@ -39,7 +40,7 @@ HANGING_S: Final = SPLASH_S + 10.0 / 60.0
 """Time from loading a level to a physical ball: `roller` waits 10 frames, at the nominal 60 frames
 a second, which the splash holds up. Until then nothing moves and nothing happens."""
 
-_COIN, _FINISH, _FALL, _PROGRESS = (TERMS.index(name) for name in TERMS)
+_COIN, _FINISH, _FALL, _PROGRESS = (REWARD_TERMS.index(name) for name in REWARD_TERMS)
 
 _act = all_hooks("act")
 _notice = all_hooks("notice")
@@ -59,7 +60,7 @@ class Step(NamedTuple):
             step does not count.
         fell: (N,) whether the ball fell, be the game over or not.
         coins: (N, 1) how many coins were collected.
-        terms: (N, terms) what the step has earned, by `roller_env.game.rewards.TERMS`.
+        terms: (N, terms) what the step has earned, by `roller_env.game.result.REWARD_TERMS`.
         reward: (N,) their sum.
         camera: what was asked of the cameras.
     """
@@ -79,7 +80,7 @@ class Rewarding(NamedTuple):
     """What a step is worth.
 
     Attributes:
-        weights: (terms,) by `roller_env.game.rewards.TERMS`.
+        weights: (terms,) by `roller_env.game.result.REWARD_TERMS`.
         shaped: whether progress along the route pays.
         discount: of the shaping.
     """
@@ -206,7 +207,7 @@ class Games:
             end=np.full(num_envs, np.inf),
             fell=flags(),
             coins=np.zeros((num_envs, 1), dtype=np.int64),
-            terms=np.zeros((num_envs, len(TERMS))),
+            terms=np.zeros((num_envs, len(REWARD_TERMS))),
             reward=np.zeros(num_envs),
             camera=CameraAsked(np.full(num_envs, -1), flags(), flags()),
         )
@@ -430,7 +431,8 @@ def _pay(
         terms[_PROGRESS] = shaping(before, after, over, rewarding.discount)
         total += terms[_PROGRESS]
     for term in range(len(terms)):
-        state.earned[env, term] += terms[term]
+        state.reward_terms[env, term] += terms[term]
+    state.total_reward[env] += total
     games.step.reward[env] = total
 
 

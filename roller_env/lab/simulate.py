@@ -64,7 +64,7 @@ def record(
         if sample == count or (goes_on is not None and not goes_on()):
             break
         mujoco.mj_step(model, data, every)
-    time = begin + np.arange(last + 1) * every * model.opt.timestep
+    time = begin + np.arange(last + 1, dtype=np.float64) * every * model.opt.timestep
     return Path(time, qpos[: last + 1], qvel[: last + 1])
 
 

@@ -49,29 +49,38 @@ class PhysicsPreset:
 
     def __post_init__(self) -> None:
         """Refuse what MuJoCo cannot compute with, or not in any reasonable time."""
-        if not (isinstance(self.name, str) and 0 < len(self.name) <= _LONGEST_NAME):
-            raise ValueError(
-                f"physics.name: found {self.name!r}; must be text of 1 to {_LONGEST_NAME} "
-                "characters"
-            )
         seconds = f"a number of seconds from {MIN_DT_S:g} to 1"
-        checked = {
-            "dt_s": checks.number("physics.dt_s", self.dt_s, MIN_DT_S, 1.0, seconds),
-            "integrator": checks.one_of(
-                "physics.integrator", self.integrator, get_args(Integrator)
-            ),
-            "cone": checks.one_of("physics.cone", self.cone, get_args(Cone)),
-            "impratio": checks.number(
-                "physics.impratio", self.impratio, 1e-6, 1e6, "a number from 1e-6 to 1e6"
-            ),
-            "solver": checks.one_of("physics.solver", self.solver, get_args(Solver)),
-            "iterations": checks.whole("physics.iterations", self.iterations, 1, MAX_ITERATIONS),
-            "tolerance": checks.number(
-                "physics.tolerance", self.tolerance, 0.0, 1.0, "a number from 0 to 1"
-            ),
-        }
+        number, one_of = checks.number, checks.one_of
+        checked = checks.each(
+            {
+                "name": lambda: _name(self.name),
+                "dt_s": lambda: number("physics.dt_s", self.dt_s, MIN_DT_S, 1.0, seconds),
+                "integrator": lambda: one_of(
+                    "physics.integrator", self.integrator, get_args(Integrator)
+                ),
+                "cone": lambda: one_of("physics.cone", self.cone, get_args(Cone)),
+                "impratio": lambda: number(
+                    "physics.impratio", self.impratio, 1e-6, 1e6, "a number from 1e-6 to 1e6"
+                ),
+                "solver": lambda: one_of("physics.solver", self.solver, get_args(Solver)),
+                "iterations": lambda: checks.whole(
+                    "physics.iterations", self.iterations, 1, MAX_ITERATIONS
+                ),
+                "tolerance": lambda: number(
+                    "physics.tolerance", self.tolerance, 0.0, 1.0, "a number from 0 to 1"
+                ),
+            }
+        )
         for name, value in checked.items():
             object.__setattr__(self, name, value)
+
+
+def _name(name: object) -> str:
+    if isinstance(name, str) and 0 < len(name) <= _LONGEST_NAME:
+        return name
+    raise ValueError(
+        f"physics.name: found {name!r}; must be text of 1 to {_LONGEST_NAME} characters"
+    )
 
 
 FAST: Final = PhysicsPreset("fast", dt_s=1 / 120, solver="PGS", iterations=500)

@@ -69,7 +69,7 @@ def level_choices(level: LevelSource) -> Choices:
 
 
 @dataclass(frozen=True)
-class KeysSnapshot(messages.Snapshot):  # type: ignore[misc]
+class KeysSnapshot(messages.Snapshot):
     """What the person holds, told in every frame of the viewer.
 
     Attributes:
@@ -82,14 +82,14 @@ class KeysSnapshot(messages.Snapshot):  # type: ignore[misc]
 
 
 @dataclass(frozen=True)
-class WishEvent(messages.Event):  # type: ignore[misc]
+class WishEvent(messages.Event):
     """What the person asked for."""
 
     wish: Wish
 
 
 @dataclass(frozen=True, eq=False)
-class FrameSnapshot(messages.Snapshot):  # type: ignore[misc]
+class FrameSnapshot(messages.Snapshot):
     """The game as it stands.
 
     Attributes:
@@ -102,7 +102,7 @@ class FrameSnapshot(messages.Snapshot):  # type: ignore[misc]
 
 
 @dataclass(frozen=True, eq=False)
-class SceneEvent(messages.Event):  # type: ignore[misc]
+class SceneEvent(messages.Event):
     """A level's scenery, which is the viewer thread's from then on."""
 
     scene: PlayScene
@@ -110,7 +110,7 @@ class SceneEvent(messages.Event):  # type: ignore[misc]
     choice: str
 
 
-class GamePlugin(plugin.SimPlugin):  # type: ignore[misc]  # MuJoCo comes without types
+class GamePlugin(plugin.SimPlugin):
     """The game, on the simulation thread.
 
     Attributes:
@@ -141,18 +141,18 @@ class GamePlugin(plugin.SimPlugin):  # type: ignore[misc]  # MuJoCo comes withou
         self._looked_s = time.monotonic()
         self.latest = self._session.frame()
 
-    @messages.handler  # type: ignore[untyped-decorator]
+    @messages.handler
     def on_load_model(self, _: messages.LoadModelEvent) -> bool:
         """Publish the level; Studio asks for it at the start."""
         self._publish()
         return True
 
-    @messages.handler  # type: ignore[untyped-decorator]
+    @messages.handler
     def on_keys(self, snapshot: KeysSnapshot) -> None:
         """Keep what is held."""
         self._keys = snapshot
 
-    @messages.handler  # type: ignore[untyped-decorator]
+    @messages.handler
     def on_wish(self, event: WishEvent) -> None:
         """Do what the person asked for."""
         wish, session = event.wish, self._session
@@ -167,7 +167,7 @@ class GamePlugin(plugin.SimPlugin):  # type: ignore[misc]  # MuJoCo comes withou
         else:
             session.hand_back()
 
-    @messages.handler  # type: ignore[untyped-decorator]
+    @messages.handler
     def on_step(self, event: messages.StepEvent) -> bool:
         """Let the time pass that has passed, and show the result."""
         now = time.monotonic()
@@ -184,7 +184,7 @@ class GamePlugin(plugin.SimPlugin):  # type: ignore[misc]  # MuJoCo comes withou
         time.sleep(TICK_S)
         return True
 
-    @messages.handler  # type: ignore[untyped-decorator]
+    @messages.handler
     def on_exit(self, _: messages.ExitEvent) -> None:
         """End the game properly, for those who record it."""
         self._session.close()
@@ -215,7 +215,7 @@ _STEERING: Final = {
 }
 
 
-class ScreenPlugin(plugin.ViewerPlugin):  # type: ignore[misc]
+class ScreenPlugin(plugin.ViewerPlugin):
     """Keys, picture and panels, on the viewer's thread.
 
     Attributes:
@@ -242,21 +242,21 @@ class ScreenPlugin(plugin.ViewerPlugin):  # type: ignore[misc]
         self._fell_s = -np.inf
         self._help = False
 
-    @messages.handler  # type: ignore[untyped-decorator]
+    @messages.handler
     def on_scene(self, event: SceneEvent) -> None:
         """Take over a level's scenery."""
         self._scene, self._frame, self._shown = event, None, None
         self._flares = Flares(expand(event.level).coins)
         self.camera.reset()
 
-    @messages.handler  # type: ignore[untyped-decorator]
+    @messages.handler
     def on_frame(self, snapshot: FrameSnapshot) -> None:
         """Keep the game's latest frame; one of another level comes too early or too late."""
         if self._scene is not None and snapshot.frame.level is self._scene.level:
             self._frame = snapshot.frame
         self._answered_s = snapshot.told_s
 
-    @messages.handler  # type: ignore[untyped-decorator]
+    @messages.handler
     def on_update(self, _: messages.UpdateEvent) -> None:
         """Read the keys and draw the frame."""
         held = letters(
@@ -276,7 +276,7 @@ class ScreenPlugin(plugin.ViewerPlugin):  # type: ignore[misc]
         self._draw(frame, scene.scene, time.monotonic())
         self._shown = frame
 
-    @messages.handler  # type: ignore[untyped-decorator]
+    @messages.handler
     def on_build_gui(self, _: messages.BuildGuiEvent) -> None:
         """Show the panels, and pass on what the person asks for."""
         # All keys and the mouse are the game's: the browser is not to move the camera itself.

@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from roller_env.config import EnvConfig, LevelSource, make_config
+from roller_env.config import EnvConfig, LevelSource
 from roller_env.envs.spaces import shape_observation
 from roller_env.physics.presets import PhysicsPreset, physics_preset
 from roller_env.problems import shown
@@ -64,7 +64,7 @@ def load_autopilot(
         RunError: not a run, or an agent that needs pictures.
     """
     policy: TrainedPolicy = load_policy(run, trust=trust)
-    trained = make_config(level=policy.config.level, **policy.config.evaluation_options)
+    trained = policy.config.evaluation_environment
     if trained.observation == "pixels":
         raise RunError(f"{shown(run)}: its agent looks at pictures, which a page does not give it")
     preset = physics_preset(physics or trained.physics)

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Float64
 from roller_env.game.cameras import (
     MODE_BEHIND,
     MODE_BELOW,
@@ -22,8 +22,6 @@ from roller_env.game.cameras import (
     camera_target,
     retreat,
 )
-
-Float64 = npt.NDArray[np.float64]
 
 ORDER: Final = (
     MODE_BEHIND,

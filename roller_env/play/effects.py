@@ -9,12 +9,10 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Bool, Float64
 from roller_env.units import quants
 
-Bool = npt.NDArray[np.bool_]
-Float64 = npt.NDArray[np.float64]
 Colour = tuple[float, float, float]
 
 FLARE_GROWTH_PER_S: Final = 48.0

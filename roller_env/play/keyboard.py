@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import RecordConstructorArgs
 
-from roller_env.envs.spaces import action_of_keys
-from roller_env.game.actions import KEYS
+from roller_env.game.actions import KEYS, action_of_keys, held_letters
 
 ARROWS: Final = {"up": "w", "left": "a", "down": "s", "right": "d"}
 """The arrow keys, and the letter that each of them stands for."""
@@ -94,8 +93,3 @@ class KeyboardWrapper(gym.ActionWrapper[Any, Any, Any], RecordConstructorArgs):
         if held.shape != (len(KEYS),) or not np.isin(held, (0, 1)).all():
             raise ValueError(f"keys: found {action!r}; must be four of 0 and 1: W A S D")
         return action_of_keys(self._mode, held_letters(held))
-
-
-def held_letters(held: npt.NDArray[Any]) -> str:
-    """Return the letters of the keys in ``held``, (4,) of 0 and 1."""
-    return "".join(key for key, down in zip(KEYS, held, strict=True) if down)

@@ -15,9 +15,10 @@ from typing import Any, Final
 from mujoco.studio.dear_imgui import dear_imgui as imgui
 
 from roller_env.game.cameras import MODES
+from roller_env.game.result import EpisodeResult, Outcome
 from roller_env.game.state import COIN_ON_PANELS
 from roller_env.game.step import INTRO_S, SPLASH_S
-from roller_env.play.session import GameFrame, Result
+from roller_env.play.session import GameFrame
 
 Rows = Sequence[tuple[str, str]]
 
@@ -47,6 +48,13 @@ _PANEL: Final = (0.06, 0.10, 0.17, 0.86)
 _BUTTON: Final = (0.13, 0.50, 0.86, 1.0)
 _BUTTON_LIT: Final = (0.20, 0.60, 0.98, 1.0)
 _BUTTON_DIM: Final = (0.17, 0.24, 0.35, 1.0)
+
+_END_TITLES: Final[dict[Outcome, tuple[str, Colour]]] = {
+    "finish": ("Finish!", _GREEN),
+    "diverged": ("The physics failed", _RED),
+    "time limit": ("The time is up", _RED),
+}
+"""How the end panel says how a game ended; after a fall there is none, the level begins anew."""
 
 FALL_MESSAGE_S: Final = 2.0
 
@@ -87,18 +95,18 @@ class Choice:
 def build_points_gui(frame: GameFrame, camera_mode: int) -> None:
     """Show the points at the top left, always."""
     with panel("points", x=_MARGIN, y=_MARGIN):
-        points, *details = points_lines(frame.result, camera_mode)
+        points, *details = points_lines(frame.result, frame.coins_in_level, camera_mode)
         _text(points, _LARGE_SIZE, _GOLD)
         for detail in details:
             _text(detail, _SMALL_SIZE, _FAINT)
 
 
-def points_lines(result: Result, camera_mode: int) -> list[str]:
+def points_lines(result: EpisodeResult, coins_in_level: int, camera_mode: int) -> list[str]:
     """Return the lines of the points panel: the points, then what they are and what else counts."""
     lines = [
         f"{COIN_ON_PANELS * result.coins}",
         f"points   {result.time_s:.1f} s",
-        f"{result.coins} of {result.coins_in_level} coins",
+        f"{result.coins} of {coins_in_level} coins",
     ]
     if camera_mode:
         lines.append(f"camera: {MODES[camera_mode].replace('_', ' ')}")
@@ -166,9 +174,9 @@ def build_end_gui(frame: GameFrame, following: Choice | None) -> Wish | None:
     """
     result, wish = frame.result, None
     with panel("end", pivot=(0.5, 0.5), pad=28.0):
-        title, colour = end_title(frame)
+        title, colour = _END_TITLES.get(result.outcome, (result.outcome, _WHITE))
         _text(title, _TITLE_SIZE, colour)
-        _rows(end_rows(result))
+        _rows(end_rows(result, frame.coins_in_level))
         imgui.Dummy(imgui.Vec2(0.0, 8.0))
         ahead = result.success and following is not None
         if _button("Play again", lit=not ahead, height=44.0) or (not ahead and _enter()):
@@ -180,25 +188,15 @@ def build_end_gui(frame: GameFrame, following: Choice | None) -> Wish | None:
     return wish
 
 
-def end_rows(result: Result) -> Rows:
+def end_rows(result: EpisodeResult, coins_in_level: int) -> Rows:
     """Return what the end panel tells of a game: names and values."""
-    points, all_points = COIN_ON_PANELS * result.coins, COIN_ON_PANELS * result.coins_in_level
+    points, all_points = COIN_ON_PANELS * result.coins, COIN_ON_PANELS * coins_in_level
     return (
         ("Points", f"{points} of {all_points}"),
-        ("Coins", f"{result.coins} of {result.coins_in_level}"),
+        ("Coins", f"{result.coins} of {coins_in_level}"),
         ("Score", f"{result.score_percent:.0f} %"),
         ("Time", f"{result.time_s:.1f} s"),
     )
-
-
-def end_title(frame: GameFrame) -> tuple[str, Colour]:
-    """Return how a game ended, in words, and their colour."""
-    result = frame.result
-    if result.success:
-        return "Finish!", _GREEN
-    if result.diverged:
-        return "The physics failed", _RED
-    return "The time is up", _RED
 
 
 def build_agent_gui(frame: GameFrame) -> None:

@@ -8,8 +8,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, cast
 
-import numpy as np
-import numpy.typing as npt
 from mujoco.studio import messages
 from mujoco.studio.dear_imgui import dear_imgui as imgui
 
@@ -18,11 +16,9 @@ from roller_env.play import panels
 from roller_env.play.app import Choices, GamePlugin, SceneEvent, ScreenPlugin
 from roller_env.play.panels import Choice, Wish
 from roller_env.play.scene import Quality
-from roller_env.play.session import GameFrame, GameSession, Phase, Result
+from roller_env.play.session import GameFrame, GameSession, Phase
 from roller_env.play.sound import CoinSound
 from roller_env.replay import Playback, Replay
-
-Float64 = npt.NDArray[np.float64]
 
 JUMP_S: Final = 1.0
 """What the arrow keys go forward and back."""
@@ -128,7 +124,6 @@ class ReplaySession:
     def frame(self) -> GameFrame:
         """Return what is to be drawn now."""
         simulation = self._playback.simulation
-        results = {k: v[0].item() for k, v in simulation.results(np.array([0])).items()}
         step_s = simulation.duration_s
         return GameFrame(
             level=self.compiled.level,
@@ -142,11 +137,8 @@ class ReplaySession:
             ball=self.compiled.ball_qpos,
             state=simulation.state.copy_rows(),
             clock_s=self._scenery_s,
-            result=Result(
-                truncated=bool(simulation.state.truncated[0]),
-                coins_in_level=int(simulation.coins_in_level[0]),
-                **results,
-            ),
+            result=simulation.result(),
+            coins_in_level=int(simulation.coins_in_level[0]),
             control_in_s=float(simulation.state.control_delay_s[0]),
             falls=0,
             agent=False,
@@ -168,7 +160,7 @@ class ReplaySession:
 
 
 @dataclass(frozen=True)
-class SeekEvent(messages.Event):  # type: ignore[misc]  # MuJoCo comes without types
+class SeekEvent(messages.Event):
     """The person wants to see another moment."""
 
     time_s: float
@@ -190,7 +182,7 @@ class ReplayPlugin(GamePlugin):
         session = cast("GameSession", self.replay_session)
         super().__init__(lambda _: session, choices_of(replay), sound, quality)
 
-    @messages.handler  # type: ignore[untyped-decorator]
+    @messages.handler
     def on_seek(self, event: SeekEvent) -> None:
         """Go where the person wants to."""
         self.replay_session.seek(event.time_s)

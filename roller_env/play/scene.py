@@ -17,8 +17,8 @@ from typing import Any, Final, Literal, NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Bool, Float64, Int64
 from roller_env.compile.mjcf import BALL, build_spec
 from roller_env.compile.scenery import add_scenery
 from roller_env.drawing.renderer import FIELD_OF_VIEW_DEG
@@ -30,10 +30,6 @@ from roller_env.level.schema import Level
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.pieces.look import Fly, Shape, part
 from roller_env.play.effects import Light
-
-Bool = npt.NDArray[np.bool_]
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 BALL_GROUP: Final = 2
 """Geom group of the ball, which is not seen in first person."""

@@ -108,7 +108,7 @@ def open_page(
 
     origins = LOCAL_ORIGINS if host == LOOPBACK else None
 
-    class PageViewer(web_viewer.WebViewer):  # type: ignore[misc]  # MuJoCo comes without types
+    class PageViewer(web_viewer.WebViewer):
         """Studio's web viewer, bound to one address."""
 
         @property
@@ -122,7 +122,10 @@ def open_page(
         def _start_server(self) -> None:
             self._page_drew = threading.Event()
             taking = web_server._SessionMessage.FORCE_CONTROL
-            web_server.serve = _serving(taking, self._page_drew.set, origins)
+            # Imported there from websockets, and called by that name.
+            web_server.serve = _serving(  # type: ignore[attr-defined]
+                taking, self._page_drew.set, origins
+            )
             super()._start_server()
 
         def prepare_next_frame(self) -> bool:
@@ -154,7 +157,7 @@ def open_window(plugins: Plugins) -> viewer_handle.ViewerHandle:
     except ImportError as error:
         raise PlayError(f"MuJoCo Studio's window does not load here: {error}") from error
 
-    class WindowViewer(native_viewer.NativeViewer):  # type: ignore[misc]
+    class WindowViewer(native_viewer.NativeViewer):
         """Studio's window, which survives a change of the level.
 
         To destroy a scene that has been drawn crashes in MuJoCo 4.0.0: scenes of levels that were

@@ -15,20 +15,18 @@ from enum import Enum
 from typing import Any, Final, Protocol
 
 import numpy as np
-import numpy.typing as npt
 from gymnasium.utils import seeding
 
+from roller_env.arrays import Float64
 from roller_env.compile.compiled import CompiledLevel
 from roller_env.config import EnvConfig, LevelSource
-from roller_env.envs.spaces import action_of_keys
-from roller_env.game.actions import forces
+from roller_env.game.actions import action_of_keys, forces
+from roller_env.game.result import EpisodeResult
 from roller_env.game.state import GameState
 from roller_env.level import Level
 from roller_env.physics.presets import PhysicsPreset, physics_preset
 from roller_env.rigid_body import FixedStepPacer, Pose, interpolate
 from roller_env.simulation import Simulation, Transition
-
-Float64 = npt.NDArray[np.float64]
 
 MAX_CATCH_UP_S: Final = 0.1
 """Most game time that one frame may ask for. After a longer stall the game runs slower than the
@@ -67,33 +65,8 @@ class Observer(Protocol):
     def on_step(self, simulation: Simulation, force_n: Float64, transition: Transition) -> None:
         """A control step has been made with the keys' force ``force_n``, (1, 2) newtons."""
 
-    def on_end(self, simulation: Simulation, result: Result) -> None:
+    def on_end(self, simulation: Simulation, result: EpisodeResult) -> None:
         """The episode is over, or was left; nothing more of it comes."""
-
-
-@dataclass(frozen=True)
-class Result:
-    """How an episode stands or ended.
-
-    Attributes:
-        success: at the finish.
-        fall: below the kill height.
-        diverged: the physics failed.
-        truncated: the time is up.
-        coins: collected.
-        coins_in_level: as many as there are.
-        score_percent: coins over the level's, 0 to 100.
-        time_s: since it began.
-    """
-
-    success: bool
-    fall: bool
-    diverged: bool
-    truncated: bool
-    coins: int
-    coins_in_level: int
-    score_percent: float
-    time_s: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +86,7 @@ class GameFrame:
         state: the game's, of one row.
         clock_s: time that scenery moves by; it stands still only in a pause.
         result: how the episode stands.
+        coins_in_level: as many as can be collected.
         control_in_s: until the keys work.
         falls: episodes of this session that ended in a fall.
         agent: whether there is an agent.
@@ -130,7 +104,8 @@ class GameFrame:
     ball: int
     state: GameState
     clock_s: float
-    result: Result
+    result: EpisodeResult
+    coins_in_level: int
     control_in_s: float
     falls: int
     agent: bool
@@ -234,14 +209,9 @@ class GameSession:
         return self._pacer.dropped_s
 
     @property
-    def result(self) -> Result:
+    def result(self) -> EpisodeResult:
         """How the episode stands."""
-        results = {k: v[0].item() for k, v in self.simulation.results(np.array([0])).items()}
-        return Result(
-            truncated=bool(self.simulation.state.truncated[0]),
-            coins_in_level=int(self.simulation.coins_in_level[0]),
-            **results,
-        )
+        return self.simulation.result()
 
     def frame(self) -> GameFrame:
         """Return what is to be drawn now."""
@@ -259,6 +229,7 @@ class GameSession:
             state=state.copy_rows(),
             clock_s=self._scenery_s,
             result=self.result,
+            coins_in_level=int(self.simulation.coins_in_level[0]),
             control_in_s=float(state.control_delay_s[0]),
             falls=self.falls,
             agent=self._agent is not None,

@@ -12,11 +12,17 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.envs.spaces import action_of_keys
-from roller_env.game.actions import DIRECTIONS, KEY_AXES, KEY_FORCE_N, KEYS, ActionMode, forces
+from roller_env.arrays import Bool, Float64
+from roller_env.game.actions import (
+    COMBINATIONS,
+    DIRECTIONS,
+    KEY_CODES,
+    KEYS,
+    ActionMode,
+    actions_of,
+)
 from roller_env.replay.errors import ReplayError
 
-Float64 = npt.NDArray[np.float64]
 Actions = npt.NDArray[Any]
 
 Encoding = Literal["u1", "f4", "f8"]
@@ -35,16 +41,6 @@ _RANGES: Final[dict[ActionMode, tuple[int, int]]] = {
     "keys": (0, 1),
     "force": (-1, 1),
 }
-_BITS: Final = 2 ** np.arange(len(KEYS))
-_DIRECTION_OF_KEYS: Final = np.array(
-    [
-        action_of_keys("directions", "".join(k for i, k in enumerate(KEYS) if bits >> i & 1))
-        for bits in range(2 ** len(KEYS))
-    ]
-)
-"""Number among `DIRECTIONS` of every combination of held keys, by its bits."""
-
-assert len(DIRECTIONS) == _DIRECTION_OF_KEYS.max() + 1, "every direction is a combination of keys"
 
 
 def checked_actions(mode: ActionMode, actions: npt.ArrayLike) -> Actions:
@@ -79,38 +75,16 @@ def checked_actions(mode: ActionMode, actions: npt.ArrayLike) -> Actions:
     return single if (single == array).all() else array.astype(np.float64)
 
 
-def actions_of(mode: ActionMode, force_n: Float64) -> Actions:
-    """Return the actions that push with ``force_n``, (T, 2) newtons: `forces` the other way round.
+def recorded_actions(mode: ActionMode, force_n: Float64) -> Actions:
+    """Return the actions that push with ``force_n``, (T, 2) newtons, as a replay holds them.
 
     Raises:
         ReplayError: no action of that mode does.
     """
-    # Nothing is computed with what no key gives, or is no number at all.
-    push = np.where(np.abs(force_n) <= KEY_FORCE_N, force_n, 0.0) / KEY_FORCE_N
-    if mode == "force":
-        actions = _pushes(push, force_n)
-    else:
-        along = np.clip(np.round(push @ KEY_AXES.T), 0.0, 1.0).astype(np.int8)
-        actions = along if mode == "keys" else _DIRECTION_OF_KEYS[along @ _BITS]
-    wrong = np.flatnonzero((forces(mode, actions) != force_n).any(axis=1))
-    if len(wrong):
-        raise ReplayError(
-            f"the force of step {wrong[0]}, {force_n[wrong[0]].tolist()} N, is no action of mode "
-            f"{mode!r}; choose another with the option 'action'"
-        )
-    return checked_actions(mode, actions)
-
-
-def _pushes(push: Float64, force_n: Float64) -> Float64:
-    """Return the pushes of mode ``force`` that give these forces, where there are any.
-
-    A force is a rounded product, so its push is the quotient or a neighbour of it. Agents push in
-    float32: that comes first.
-    """
-    found = push.astype(np.float32).astype(np.float64)
-    for other in (push, np.nextafter(push, -1.0), np.nextafter(push, 1.0)):
-        found = np.where(KEY_FORCE_N * found == force_n, found, other)
-    return found
+    try:
+        return checked_actions(mode, actions_of(mode, force_n))
+    except ValueError as error:
+        raise ReplayError(str(error)) from None
 
 
 def encoding_of(actions: Actions) -> Encoding:
@@ -125,7 +99,7 @@ def encode_actions(actions: Actions) -> bytes:
     encoding = encoding_of(actions)
     if encoding != "u1":
         return actions.astype("<" + encoding).tobytes()
-    codes = actions @ _BITS if actions.ndim == 2 else actions
+    codes = actions @ KEY_CODES if actions.ndim == 2 else actions
     return codes.astype(np.uint8).tobytes()
 
 
@@ -144,11 +118,11 @@ def decode_actions(mode: ActionMode, encoding: Encoding, content: bytes) -> Acti
     codes = np.frombuffer(content, np.uint8)
     if mode == "directions":
         return checked_actions(mode, codes)
-    _refuse(mode, codes >= 2 ** len(KEYS), codes, f"key codes 0 to {2 ** len(KEYS) - 1}")
-    return checked_actions(mode, ((codes[:, None] & _BITS) > 0).astype(np.int8))
+    _refuse(mode, codes >= len(COMBINATIONS), codes, f"key codes 0 to {len(COMBINATIONS) - 1}")
+    return checked_actions(mode, ((codes[:, None] & KEY_CODES) > 0).astype(np.int8))
 
 
-def _refuse(mode: ActionMode, wrong: npt.NDArray[np.bool_], actions: Actions, allowed: str) -> None:
+def _refuse(mode: ActionMode, wrong: Bool, actions: Actions, allowed: str) -> None:
     if wrong.any():
         step = int(wrong.argmax())
         raise ReplayError(

@@ -14,13 +14,11 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.arrays import Int64, UInt32
 from roller_env.pieces.coin import COIN
 from roller_env.pieces.lift_pad import LIFT_PAD
 from roller_env.pieces.plate import PLATE
 from roller_env.simulation import Simulation
-
-Int64 = npt.NDArray[np.int64]
-UInt32 = npt.NDArray[np.uint32]
 
 QUANTITIES: Final[dict[str, Callable[[Simulation], npt.NDArray[Any]]]] = {
     "ball_position": lambda game: game.ball_position,

@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import platform
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib.metadata import version
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final
 
-import numpy as np
-import numpy.typing as npt
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from roller_env import __version__
+from roller_env.arrays import Float64
 from roller_env.config import EnvConfig, make_config
-from roller_env.game.actions import ActionMode, forces
-from roller_env.game.observations import ObservationMode
-from roller_env.game.rewards import RewardMode, RewardWeights
+from roller_env.game.actions import forces
+from roller_env.game.result import EpisodeResult
 from roller_env.game.version import RULES_VERSION
 from roller_env.level import Level
-from roller_env.physics.presets import PhysicsPreset, physics_preset
 from roller_env.physics.version import PHYSICS_VERSION, Engine
 from roller_env.replay.actions import Actions, checked_actions
 from roller_env.replay.checksums import MAX_ROWS, QUANTITIES, Checksums, row_count
 from roller_env.replay.errors import ReplayError
-
-Float64 = npt.NDArray[np.float64]
 
 FORMAT_VERSION: Final = 2
 """Raised when a file of before can no longer be read."""
@@ -37,7 +33,6 @@ MAX_STEPS: Final = 2**20
 MAX_PHYSICS_STEPS: Final = 2**22
 """Physics steps of a replay, since a file must not be able to ask for days of work: over an hour
 of the finest preset."""
-
 
 MAX_TEXT: Final = 200
 """Characters of a name in a replay."""
@@ -55,11 +50,7 @@ Number = Annotated[float, Field(allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0, lt=2**31)]
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
-
-
-class Versions(_Frozen):
+class Versions(BaseModel):
     """What computed the episode. The same on two machines, the bits are the same.
 
     Attributes:
@@ -75,6 +66,8 @@ class Versions(_Frozen):
         system: the operating system.
         libc: the C library, whose sines and cosines MuJoCo uses.
     """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     rules: Count
     engine: Engine
@@ -116,79 +109,15 @@ class Versions(_Frozen):
         )
 
 
-class Options(_Frozen):
-    """The options of the environment on which an episode and what an agent sees of it depend.
+def recorded_options(config: EnvConfig, level: Level) -> EnvConfig:
+    """Return the options on which an episode and what an agent sees of it depend, alone.
 
-    They are those of `roller_env.config.EnvConfig`; ``physics`` is the whole preset, so that a
-    replay outlives a change of what the preset's name stands for.
+    Args:
+        config: in which it is played; the preset is taken whole, so that a replay outlives a change
+            of what the preset's name stands for.
+        level: that is played.
     """
-
-    action: ActionMode
-    observation: ObservationMode
-    reward: RewardMode
-    reward_weights: RewardWeights
-    discount: Number
-    control_dt_s: Number
-    physics: PhysicsPreset
-    max_episode_steps: int | None
-
-    @model_validator(mode="after")
-    def _can_be_played(self) -> Options:
-        EnvConfig(**self.keywords())
-        return self
-
-    @staticmethod
-    def of(config: EnvConfig) -> Options:
-        """Return the options of a configuration."""
-        return Options(
-            action=config.action,
-            observation=config.observation,
-            reward=config.reward,
-            reward_weights=config.reward_weights,
-            discount=float(config.discount),
-            control_dt_s=float(config.control_dt_s),
-            physics=physics_preset(config.physics),
-            max_episode_steps=config.max_episode_steps,
-        )
-
-    def keywords(self) -> dict[str, Any]:
-        """Return the options by the names `EnvConfig` has for them."""
-        return {name: getattr(self, name) for name in Options.model_fields}
-
-
-class Result(_Frozen):
-    """How an episode ended, or stood when its recording did.
-
-    Attributes:
-        success: at the finish.
-        fall: below the kill height.
-        diverged: the physics failed.
-        truncated: the time was up.
-        coins: collected.
-        score_percent: of the level's coins.
-        time_s: played.
-        total_reward: undiscounted sum, with the replay's reward options.
-    """
-
-    success: bool
-    fall: bool
-    diverged: bool
-    truncated: bool
-    coins: Count
-    score_percent: Number
-    time_s: Number
-    total_reward: Number
-
-    @property
-    def outcome(self) -> Literal["finish", "fall", "diverged", "time limit", "not ended"]:
-        """The end in a word or two."""
-        if self.success:
-            return "finish"
-        if self.fall:
-            return "fall"
-        if self.diverged:
-            return "diverged"
-        return "time limit" if self.truncated else "not ended"
+    return make_config(level=level, num_threads=1, **config.episode_options())
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,8 +125,7 @@ class Replay:
     """One episode from its start, by what it depends on; all else is computed again from that.
 
     Attributes:
-        level: what was played.
-        options: how.
+        options: what was played and how, as `recorded_options` has them.
         start: where the ball's centre began, metres, world frame. It is all that chance decides in
             an episode: the jitter that the row's random generator drew at the reset.
         intro: whether the keys worked only after the intro.
@@ -210,13 +138,12 @@ class Replay:
         seed: what the row's generator was seeded with before the first of its episodes, if known.
     """
 
-    level: Level
-    options: Options
+    options: EnvConfig
     start: tuple[float, float, float]
     intro: bool
     actions: Actions
     checksums: Checksums
-    result: Result
+    result: EpisodeResult
     versions: Versions
     player: str = ""
     seed: int | None = None
@@ -232,7 +159,7 @@ class Replay:
         if not self.player.isprintable():
             raise ReplayError(f"player: found {self.player!r}; must be characters that print")
         object.__setattr__(self, "actions", checked_actions(self.options.action, self.actions))
-        check_game(self.level, self.options, self.start, len(self.actions))
+        check_game(self.options, self.start, len(self.actions))
         self._check_checksums()
 
     def _check_checksums(self) -> None:
@@ -256,6 +183,11 @@ class Replay:
         """Return the number of control steps."""
         return len(self.actions)
 
+    @property
+    def level(self) -> Level:
+        """What was played."""
+        return _level_of(self.options)
+
     @cached_property
     def force_n(self) -> Float64:
         """(T, 2) newtons of the keys in every control step, world x and y."""
@@ -271,6 +203,11 @@ class Replay:
         """SHA-256 of `level_text`, hexadecimal."""
         return hashlib.sha256(self.level_text.encode()).hexdigest()
 
+    @cached_property
+    def environment_key(self) -> tuple[str, str]:
+        """The level and the options as text, the same for all replays of one environment."""
+        return self.level_hash, json.dumps(self.options.episode_options())
+
     def config(self, **changes: Any) -> EnvConfig:
         """Return the configuration in which the replay is played again.
 
@@ -278,8 +215,27 @@ class Replay:
             changes: other options than the recording's, such as ``observation="rays"``. The game
                 is the same for it, as long as they are not those of the physics or of time.
         """
-        options = {"level": self.level, "num_threads": 1, **self.options.keywords(), **changes}
-        return make_config(**options)
+        return make_config(**{**self.options.keywords(), **changes})
+
+
+def check_length(options: EnvConfig, steps: int) -> None:
+    """Refuse an episode of more control steps than a replay can have.
+
+    Raises:
+        ReplayError: it is too long.
+    """
+    substeps = options.substeps
+    if steps > MAX_STEPS or steps * substeps > MAX_PHYSICS_STEPS:
+        raise ReplayError(
+            f"{steps} control steps of {substeps} physics steps each are too long a replay; "
+            f"allowed are {MAX_STEPS} control steps and {MAX_PHYSICS_STEPS} physics steps"
+        )
+
+
+def _level_of(options: EnvConfig) -> Level:
+    """Return the level of options as `recorded_options` has them: checked, and no name."""
+    assert isinstance(options.level, Level)
+    return options.level
 
 
 def canonical_text(level: Level) -> str:
@@ -287,26 +243,19 @@ def canonical_text(level: Level) -> str:
     return level.model_dump_json()
 
 
-def check_game(
-    level: Level, options: Options, start: tuple[float, float, float], steps: int
-) -> None:
+def check_game(options: EnvConfig, start: tuple[float, float, float], steps: int) -> None:
     """Refuse, before anything is made, a game that no recording of a level can hold.
 
     Args:
-        level: what was played.
-        options: how.
+        options: what was played and how, as `recorded_options` has them.
         start: where the ball's centre began, metres.
         steps: control steps.
 
     Raises:
         ReplayError: it is too long, or begins where the level does not.
     """
-    substeps = EnvConfig(**options.keywords()).substeps
-    if steps > MAX_STEPS or steps * substeps > MAX_PHYSICS_STEPS:
-        raise ReplayError(
-            f"{steps} control steps of {substeps} physics steps each are too long a replay; "
-            f"allowed are {MAX_STEPS} control steps and {MAX_PHYSICS_STEPS} physics steps"
-        )
+    level = _level_of(options)
+    check_length(options, steps)
     begin, jitter = level.start.at, (*level.start.jitter, 0.0)
     for here, there, most in zip(start, begin, jitter, strict=True):
         # The sum of start and jitter is rounded.

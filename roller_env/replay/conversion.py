@@ -8,17 +8,16 @@ from pathlib import Path
 from typing import Any, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from roller_env.config import EnvConfig, make_config
-from roller_env.level import Level
-from roller_env.replay.actions import actions_of
-from roller_env.replay.contents import Options, Replay, Result, check_game
+from roller_env.arrays import Float64
+from roller_env.config import EnvConfig
+from roller_env.game.result import EpisodeResult
+from roller_env.replay.actions import recorded_actions
+from roller_env.replay.contents import Replay, check_game, recorded_options
 from roller_env.replay.errors import ReplayError
 from roller_env.replay.file import Header, Header2, read_whole, replay_of, unpack
-from roller_env.replay.recorder import replays_of
-
-Float64 = npt.NDArray[np.float64]
+from roller_env.replay.recorder import Recorder, place_at_starts
+from roller_env.simulation import Simulation
 
 _FORCE: Final = np.dtype(("<f8", 2))
 _CHECKSUM_BYTES: Final = 4
@@ -32,12 +31,11 @@ class Format1:
     they are of how the game was kept in memory then.
     """
 
-    level: Level
-    options: Options
+    options: EnvConfig
     start: tuple[float, float, float]
     intro: bool
     force_n: Float64
-    result: Result
+    result: EpisodeResult
     player: str
     seed: int | None
 
@@ -63,13 +61,13 @@ def load_any(file: str | os.PathLike[str]) -> Replay | Format1:
         header, level, numbers = unpack(read_whole(path), (Header2, _Header1))
         if isinstance(header, Header2):
             return replay_of(header, level, numbers)
-        check_game(level, header.options, header.start, header.steps)
+        options = recorded_options(header.options, level)
+        check_game(options, header.start, header.steps)
     except ReplayError as error:
         raise ReplayError(f"{path}: {error}") from None
     forces = numbers[: header.steps * _FORCE.itemsize]
     return Format1(
-        level=level,
-        options=header.options,
+        options=options,
         start=header.start,
         intro=header.intro,
         force_n=np.frombuffer(forces, "<f8").astype(np.float64).reshape(-1, 2),
@@ -93,17 +91,16 @@ def record_anew(played: Replay | Format1, config: EnvConfig | None = None) -> Re
         ReplayError: a force is none of an action of the configured mode, which is found before
             anything is played; or the game ends otherwise.
     """
-    if config is None:
-        config = make_config(level=played.level, num_threads=1, **played.options.keywords())
-    actions_of(config.action, played.force_n)
-    (replay,) = replays_of(
-        config,
-        np.array([played.start]),
-        [played.force_n],
-        player=played.player,
-        seeds=[played.seed],
-        intro=played.intro,
-    )
+    config = played.options if config is None else config
+    recorded_actions(config.action, played.force_n)
+    simulation = Simulation(config)
+    place_at_starts(simulation, np.array([played.start]), played.intro)
+    recorder = Recorder(simulation, played.player)
+    recorder.begin(seed=played.seed)
+    for force in played.force_n[:, None]:
+        simulation.step(force)
+        recorder.record(force)
+    replay = recorder.replay()
     if replay.result != played.result:
         raise ReplayError(
             f"the game on record ended in {_told(played.result)}; played again here, it ends in "
@@ -112,7 +109,7 @@ def record_anew(played: Replay | Format1, config: EnvConfig | None = None) -> Re
     return replay
 
 
-def _told(result: Result) -> str:
+def _told(result: EpisodeResult) -> str:
     return (
         f"{result.outcome!r} after {result.time_s:.2f} s with {result.coins} coins and a reward of "
         f"{result.total_reward:g}"

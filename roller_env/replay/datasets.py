@@ -21,7 +21,7 @@ from roller_env import ENV_IDS, __version__
 from roller_env.config import EnvConfig
 from roller_env.envs.spaces import action_space, observation_space
 from roller_env.level import load_level
-from roller_env.physics.presets import PRESETS, physics_preset
+from roller_env.physics.presets import PRESETS
 from roller_env.replay.contents import Replay
 from roller_env.replay.errors import ReplayError
 from roller_env.replay.experience import Experience, experiences
@@ -69,7 +69,7 @@ def to_minari(
         raise ValueError("replays: found none; a data set has at least one episode")
     first = replays[0]
     for replay in replays:
-        if (replay.level, replay.options) != (first.level, first.options):
+        if replay.environment_key != first.environment_key:
             raise ValueError(
                 "replays: found different levels or options; a data set is of one environment"
             )
@@ -140,8 +140,7 @@ def to_minari_by_level(replays: Sequence[Replay], prefix: str, **changes: Any) -
 
     groups: dict[tuple[str, str], list[Replay]] = {}
     for replay in replays:
-        key = (replay.level_hash, replay.options.model_dump_json())
-        groups.setdefault(key, []).append(replay)
+        groups.setdefault(replay.environment_key, []).append(replay)
     names: list[str] = []
     problems: list[str] = []
     for group in groups.values():
@@ -185,19 +184,18 @@ def environment_spec(config: EnvConfig) -> gym.envs.registration.EnvSpec:
     options' defaults. The time limit is among them, so that it is the environment's own, which the
     agent sees, and not Gymnasium's.
     """
-    usual, options = EnvConfig().to_json(), config.to_json()
     level = load_level(config.level)
     ids = [name for name, fixed in ENV_IDS.items() if fixed.get("level") == level.name]
     is_shipped = bool(ids) and load_level(level.name) == level
     spec = gym.spec(ids[0] if is_shipped else _ANY_LEVEL_ID)
-    del usual["level"], options["num_threads"]
-    if is_shipped:
-        del options["level"]
-    preset = physics_preset(config.physics)
-    if PRESETS.get(preset.name) == preset:
-        options["physics"] = preset.name
-    told = {name: value for name, value in options.items() if value != usual.get(name)}
-    return replace(spec, kwargs={**spec.kwargs, **told})
+    is_named = PRESETS.get(config.preset.name) == config.preset
+    plainer = replace(
+        config,
+        level=level.name if is_shipped else level,
+        physics=config.preset.name if is_named else config.preset,
+        num_threads=EnvConfig.num_threads,
+    )
+    return replace(spec, kwargs={**spec.kwargs, **plainer.differences(EnvConfig())})
 
 
 def _buffer(buffer: Any, experience: Experience) -> Any:

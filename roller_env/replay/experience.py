@@ -10,18 +10,14 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.envs.spaces import shape_observation
-from roller_env.replay.actions import actions_of
+from roller_env.arrays import Bool, Float64
+from roller_env.envs.spaces import Observations, shape_observation
+from roller_env.replay.actions import recorded_actions
 from roller_env.replay.checksums import checksums
 from roller_env.replay.contents import Replay
 from roller_env.replay.errors import ReplayError
-from roller_env.replay.recorder import place_at_starts
+from roller_env.replay.playback import play_together
 from roller_env.simulation import Simulation
-
-Float64 = npt.NDArray[np.float64]
-Bool = npt.NDArray[np.bool_]
-Observations = npt.NDArray[np.float32] | dict[str, npt.NDArray[np.float32]]
-
 
 STATES_AT_ONCE: Final = 2**18
 """Most states of replays that are played together: their observations, 110 numbers each at most,
@@ -97,8 +93,7 @@ def _groups(replays: Iterable[Replay]) -> Iterator[list[Replay]]:
 
 def _game_of(replay: Replay) -> tuple[str, str, bool, tuple[str, ...]]:
     """Return what is the same for replays that can be played together."""
-    options = replay.options.model_dump_json()
-    return replay.level_hash, options, replay.intro, replay.checksums.quantities
+    return *replay.environment_key, replay.intro, replay.checksums.quantities
 
 
 def _play(replays: list[Replay], changes: dict[str, Any]) -> list[Experience]:
@@ -107,22 +102,19 @@ def _play(replays: list[Replay], changes: dict[str, Any]) -> list[Experience]:
     if config.observation == "pixels":
         raise ValueError("observation: pictures are not made again; choose state, rays or dict")
     simulation = Simulation(config, len(replays))
-    place_at_starts(simulation, np.array([r.start for r in replays]), replays[0].intro)
+    transitions = play_together(simulation, replays)
     lengths = np.array([len(replay) for replay in replays])
     steps = int(lengths.max())
-    force = np.zeros((steps, len(replays), 2))
-    for row, replay in enumerate(replays):
-        force[: len(replay), row] = replay.force_n
     seen = np.empty((steps + 1, *simulation.observe().shape), dtype=np.float32)
     seen[0], reward = simulation.observe(), np.zeros((steps, len(replays)))
     terminated, truncated = (np.zeros((steps, len(replays)), dtype=bool) for _ in range(2))
     waits = np.zeros(len(replays), dtype=np.int64)
     _compare(simulation, replays, 0)
-    for step in range(steps):
-        # Control that comes back within a step does something in it.
-        waiting = simulation.state.control_delay_s >= simulation.duration_s
-        transition = simulation.step(force[step], hold=lengths <= step)
+    # Control that comes back within a step does something in it.
+    waiting = simulation.state.control_delay_s >= simulation.duration_s
+    for step, transition in enumerate(transitions):
         waits += waiting & transition.stepped
+        waiting = simulation.state.control_delay_s >= simulation.duration_s
         reward[step] = transition.reward
         terminated[step], truncated[step] = transition.terminated, transition.truncated
         seen[step + 1] = simulation.observe()
@@ -131,7 +123,7 @@ def _play(replays: list[Replay], changes: dict[str, Any]) -> list[Experience]:
         Experience(
             replay=replay,
             observations=shape_observation(config, seen[begin : end + 1, row]),
-            actions=actions_of(config.action, replay.force_n[begin:]),
+            actions=recorded_actions(config.action, replay.force_n[begin:]),
             rewards=reward[begin:end, row].copy(),
             terminated=terminated[begin:end, row].copy(),
             truncated=truncated[begin:end, row].copy(),

@@ -20,14 +20,26 @@ import hashlib
 import os
 import zlib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PlainValidator,
+    ValidationError,
+)
 from pydantic_core import from_json
 
+from roller_env import checks
 from roller_env.assets import asset_directory
+from roller_env.config import EnvConfig, make_config
+from roller_env.game.result import EpisodeResult
 from roller_env.level import Level, LevelError, load_level
 from roller_env.regular_files import read_regular_file
 from roller_env.replay.actions import (
@@ -42,17 +54,17 @@ from roller_env.replay.contents import (
     FORMAT_VERSION,
     MAX_STEPS,
     Number,
-    Options,
     Replay,
-    Result,
     Text,
     Versions,
+    recorded_options,
 )
 from roller_env.replay.errors import ReplayError
 
 SUFFIX: Final = ".replay"
 
 MAX_HEADER_BYTES: Final = 2**14
+MAX_COINS: Final = 2**31 - 1
 MAX_LEVEL_BYTES: Final = 2**22
 """A level file may have a quarter of this; with its defaults written out it grows."""
 
@@ -67,6 +79,40 @@ _MAX_BYTES: Final = (
 
 _GZIP: Final = 16 + zlib.MAX_WBITS
 _KIND: Final = "roller-replay"
+_NOT_WRITTEN: Final = {"result": {"reward_terms"}}
+"""Played again, the game tells it."""
+
+
+def _possible(result: EpisodeResult) -> EpisodeResult:
+    """Refuse a result of which no game can be."""
+    checks.whole("coins", result.coins, 0, MAX_COINS)
+    for name in ("score_percent", "time_s", "total_reward"):
+        checks.number(name, getattr(result, name))
+    if result.reward_terms is not None:
+        raise ValueError("reward_terms: found some; a file has only their sum")
+    return result
+
+
+def _options(found: object) -> EnvConfig:
+    """Return the options that a header tells: all that a recording has, and no others."""
+    if isinstance(found, EnvConfig):
+        return found
+    names = EnvConfig().episode_options()
+    if not isinstance(found, dict):
+        raise ValueError(f"found {str(found)[:20]!r}; must be a mapping of options")
+    checks.known_names("options", found, names)
+    missing = [name for name in names if name not in found]
+    if missing:
+        raise ValueError(f"found no {' and no '.join(missing)}; must have it")
+    if not isinstance(found["physics"], dict):
+        raise ValueError("physics: found a name; must be the preset's values")
+    return make_config(**found)
+
+
+RecordedResult = Annotated[EpisodeResult, AfterValidator(_possible)]
+RecordedOptions = Annotated[
+    EnvConfig, PlainValidator(_options), PlainSerializer(EnvConfig.episode_options)
+]
 
 
 class Header(BaseModel):
@@ -81,8 +127,8 @@ class Header(BaseModel):
     start: tuple[Number, Number, Number]
     intro: bool
     steps: Annotated[int, Field(ge=0, le=MAX_STEPS)]
-    result: Result
-    options: Options
+    result: RecordedResult
+    options: RecordedOptions
     level_bytes: Annotated[int, Field(ge=2, le=MAX_LEVEL_BYTES)]
     level_sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
@@ -192,7 +238,7 @@ def encode(replay: Replay) -> bytes:
         start=replay.start,
         intro=replay.intro,
         steps=len(replay),
-        result=replay.result,
+        result=replace(replay.result, reward_terms=None),
         options=replay.options,
         versions=replay.versions,
         encoding=encoding_of(replay.actions),
@@ -203,7 +249,7 @@ def encode(replay: Replay) -> bytes:
     )
     content = b"".join(
         (
-            header.model_dump_json().encode() + b"\n",
+            header.model_dump_json(exclude=_NOT_WRITTEN).encode() + b"\n",
             level + b"\n",
             encode_actions(replay.actions),
             sums.table.T.astype(_CHECKSUM).tobytes(),
@@ -232,8 +278,7 @@ def replay_of(header: Header2, level: Level, numbers: bytes) -> Replay:
     actions, sums = numbers[: header.action_bytes], numbers[header.action_bytes :]
     table = np.frombuffer(sums, _CHECKSUM).astype(np.uint32).reshape(header.checksums_shape)
     return Replay(
-        level=level,
-        options=header.options,
+        options=recorded_options(header.options, level),
         start=header.start,
         intro=header.intro,
         actions=decode_actions(header.options.action, header.encoding, actions),

@@ -9,10 +9,11 @@ import sys
 from pathlib import Path
 from typing import Final
 
+from roller_env.arrays import Float64
 from roller_env.replay.contents import Replay
 from roller_env.replay.errors import ReplayError
 from roller_env.replay.file import SUFFIX, save_replay
-from roller_env.replay.recorder import Float64, Recorder
+from roller_env.replay.recorder import Recorder
 from roller_env.simulation import Simulation, Transition
 
 SAVE_EVERY_S: Final = 10.0
@@ -62,7 +63,7 @@ class ReplayKeeper:
         """Record a step."""
         if self._recorder is None:
             return
-        self._recorder.record(force_n, transition.reward)
+        self._recorder.record(force_n)
         now_s = float(simulation.time_s[0])
         if self._directory is not None and now_s >= self._saved_s + SAVE_EVERY_S:
             self._saved_s = now_s

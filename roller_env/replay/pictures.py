@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from roller_env.drawing.canvas import Picture
 from roller_env.drawing.renderer import GameRenderer
-from roller_env.drawing.video import END_S, with_panel, write_video
+from roller_env.drawing.video import with_panel, write_video
 from roller_env.level.expand import expand
 from roller_env.replay.contents import Replay
 from roller_env.replay.playback import Playback
@@ -21,6 +21,9 @@ Camera = int | Literal["game"]
 MP4_FPS: Final = 30.0
 GIF_FPS: Final = 10.0
 """At most so many pictures a second; a film shows every control step, or every n-th."""
+
+END_S: Final = 1.0
+"""How long a film stands still at its end."""
 
 SHEET_COLUMNS: Final = 4
 SHEET_ROWS: Final = 4
@@ -128,5 +131,5 @@ def _captions(replay: Replay) -> tuple[str, str]:
     played = f"{replay.player or 'unknown player'}, {result.time_s:.1f} s to: {result.outcome}"
     in_level = len(expand(level).coins)
     coins = f"{result.coins} of {in_level} coins ({result.score_percent:.0f} %)"
-    preset = replay.options.physics.name
+    preset = replay.options.preset.name
     return level.title or level.name, f"{played}, {coins}, level {level.name}, physics {preset}"

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Float64
+from roller_env.game.result import EpisodeResult
 from roller_env.game.state import GameState
 from roller_env.replay.checksums import checksums
-from roller_env.replay.contents import Replay, Result, Versions
-from roller_env.replay.recorder import place_at_starts, result_of
+from roller_env.replay.contents import Replay, Versions
+from roller_env.replay.recorder import place_at_starts
 from roller_env.simulation import Simulation, Snapshot, Transition
-
-Float64 = npt.NDArray[np.float64]
 
 _KEYFRAMES: Final = 256
 """Moments kept while playing, so that going back need not begin at the start."""
@@ -132,6 +131,43 @@ def frames(replay: Replay) -> Iterator[Frame]:
         yield playback.frame()
 
 
+def play_together(simulation: Simulation, replays: Sequence[Replay]) -> Iterator[Transition]:
+    """Play replays of one level and one set of options in the rows of a simulation, step by step.
+
+    The simulation is at their starts before the first transition is asked for. A row whose replay
+    is over is left alone. A row's bits do not depend on its neighbours.
+
+    Args:
+        simulation: of as many rows as there are replays, all of which begin anew.
+        replays: alike also in whether they begin with the intro.
+
+    Returns:
+        The transitions of all steps of the longest.
+    """
+    place_at_starts(simulation, np.array([r.start for r in replays]), replays[0].intro)
+    lengths = np.array([len(replay) for replay in replays])
+    force_n = np.zeros((int(lengths.max()), len(replays), 2))
+    for row, replay in enumerate(replays):
+        force_n[: len(replay), row] = replay.force_n
+    return (simulation.step(force, hold=lengths <= step) for step, force in enumerate(force_n))
+
+
+def paths(replays: Sequence[Replay]) -> list[Float64]:
+    """Return where the balls of replays went: centres before every step, (T, 3) metres each.
+
+    Args:
+        replays: of one level and one set of options.
+    """
+    if not replays:
+        return []
+    simulation = Simulation(replays[0].config(), len(replays))
+    steps = play_together(simulation, replays)
+    centres = [simulation.ball_position]
+    centres += [simulation.ball_position for _ in steps]
+    together = np.stack(centres)
+    return [together[: len(replay), row] for row, replay in enumerate(replays)]
+
+
 @dataclass(frozen=True, slots=True)
 class Verification:
     """What playing a replay again has shown.
@@ -157,8 +193,8 @@ class Verification:
     first_mismatch_step: int | None
     last_match_step: int | None
     mismatches: tuple[str, ...]
-    result: Result
-    recorded: Result
+    result: EpisodeResult
+    recorded: EpisodeResult
     differences: tuple[str, ...]
 
     @property
@@ -197,7 +233,6 @@ def verify(replay: Replay) -> Verification:
     """Play a replay again and compare every checksum."""
     playback = Playback(replay)
     simulation, sums = playback.simulation, replay.checksums
-    total_reward = 0.0
     first: int | None = None
     last: int | None = None
     mismatches: tuple[str, ...] = ()
@@ -213,7 +248,7 @@ def verify(replay: Replay) -> Verification:
             # Nobody can do anything after the end.
             first = playback.step + 1 if first is None else first
             break
-        total_reward += float(playback.advance().reward[0])
+        playback.advance()
     return Verification(
         steps=len(replay),
         checks=len(sums.table),
@@ -221,7 +256,7 @@ def verify(replay: Replay) -> Verification:
         first_mismatch_step=first,
         last_match_step=last,
         mismatches=mismatches,
-        result=result_of(simulation, 0, total_reward),
+        result=simulation.result(),
         recorded=replay.result,
         differences=replay.versions.differences(Versions.here(replay.versions.engine)),
     )

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 from gymnasium.utils import seeding
 
+from roller_env.arrays import Float64, Int64, UInt32
 from roller_env.config import EnvConfig
 from roller_env.pieces.coin import COIN
-from roller_env.replay.actions import actions_of
+from roller_env.replay.actions import recorded_actions
 from roller_env.replay.checksums import QUANTITIES, Checksums, checksums, interval_of
-from roller_env.replay.contents import MAX_STEPS, Options, Replay, Result, Versions
+from roller_env.replay.contents import MAX_STEPS, Replay, Versions, recorded_options
 from roller_env.replay.errors import ReplayError
 from roller_env.simulation import Simulation
-
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
-UInt32 = npt.NDArray[np.uint32]
 
 _NAMES = tuple(QUANTITIES)
 
@@ -35,7 +31,7 @@ class _Take:
     steps: int = 0
     forces: array[float] = field(default_factory=lambda: array("d"))
     checksums: list[UInt32] = field(default_factory=list)
-    total_reward: float = 0.0
+    is_over: bool = False
 
 
 class Recorder:
@@ -44,7 +40,7 @@ class Recorder:
     It is told of each beginning and each step and reads the rest from the simulation, which knows
     nothing of it: a simulation without a recorder costs nothing, one with it some microseconds a
     recorded row and step. `RollerEnv` and a `RollerVectorEnv` that does not reset in the same step
-    leave an ended game where the recorder can read it; `replays_of` records all others afterwards.
+    leave an ended game where the recorder can read it.
     """
 
     def __init__(self, simulation: Simulation, player: str = "", check_every: int | None = None):
@@ -61,6 +57,7 @@ class Recorder:
         self._player = player
         self._every = check_every or interval_of(simulation.duration_s)
         self._takes: dict[int, _Take] = {}
+        self._options = recorded_options(simulation.config, simulation.compiled.level)
 
     def begin(self, rows: Sequence[int] | Int64 = (0,), seed: int | None = None) -> None:
         """Record ``rows`` from here on, whose episodes have just begun.
@@ -94,19 +91,25 @@ class Recorder:
             self._takes[row] = _Take((x, y, z), bool(state.control_delay_s[row] > 0.0), seed)
         self._check(chosen)
 
-    def record(self, force_n: Float64, reward: Float64) -> None:
-        """Remember a step that the simulation has just made; rows that it left alone are left out.
+    def record(self, force_n: Float64) -> None:
+        """Remember a step that the simulation has just made.
+
+        Rows that it left alone are left out, and so are those of which the game was over before:
+        whatever was done to them, the next recording begins with `begin`.
 
         Args:
             force_n: (N, 2) newtons, as given to `Simulation.step`; those of actions of the
                 simulation's mode, which `replay` makes of them again.
-            reward: (N,) as it returned.
 
         Raises:
             ValueError: a row was reset or stepped meanwhile without the recorder being told.
         """
-        steps = self._simulation.state.steps
-        made = [row for row, take in self._takes.items() if steps[row] != take.steps]
+        steps, over = self._simulation.state.steps, self._simulation.state.over
+        made = [
+            row
+            for row, take in self._takes.items()
+            if steps[row] != take.steps and not take.is_over
+        ]
         if not made:
             return
         for row in made:
@@ -118,7 +121,7 @@ class Recorder:
                 )
             take.steps += 1
             take.forces.extend(force_n[row].tolist())
-            take.total_reward += float(reward[row])
+            take.is_over = bool(over[row])
         self._check(np.sort([row for row in made if steps[row] % self._every == 0]))
 
     def _check(self, rows: Int64) -> None:
@@ -147,24 +150,16 @@ class Recorder:
             sums = [*sums, checksums(simulation, np.array([row]), _NAMES)[0]]
         force_n = np.array(take.forces).reshape(-1, 2)
         return Replay(
-            level=simulation.compiled.level,
-            options=Options.of(simulation.config),
+            options=self._options,
             start=take.start,
             intro=take.intro,
-            actions=actions_of(simulation.config.action, force_n),
+            actions=recorded_actions(simulation.config.action, force_n),
             checksums=Checksums(self._every, _NAMES, np.array(sums)),
-            result=result_of(simulation, row, take.total_reward),
+            result=simulation.result(row),
             versions=Versions.here(),
             player=self._player,
             seed=take.seed,
         )
-
-
-def result_of(simulation: Simulation, row: int, total_reward: float) -> Result:
-    """Return how the game in a row stands, given the rewards it has earned."""
-    results = {name: value[0].item() for name, value in simulation.results(np.array([row])).items()}
-    truncated = bool(simulation.state.truncated[row])
-    return Result(**results, truncated=truncated, total_reward=total_reward)
 
 
 def place_at_starts(simulation: Simulation, starts: Float64, intro: bool) -> None:
@@ -210,45 +205,6 @@ def record_episode(
     recorder.begin(seed=seed)
     while not simulation.state.over[0]:
         force = act(simulation)
-        recorder.record(force, simulation.step(force).reward)
+        simulation.step(force)
+        recorder.record(force)
     return recorder.replay()
-
-
-def replays_of(
-    config: EnvConfig,
-    starts: Float64,
-    forces: Sequence[Float64],
-    *,
-    player: str = "",
-    seeds: Sequence[int | None] | None = None,
-    intro: bool = False,
-) -> list[Replay]:
-    """Return replays of episodes of which only starts and forces were kept, by playing them again.
-
-    A row's bits do not depend on its neighbours, so these are the same games. That holds for games
-    played with this installation; forces from elsewhere make games of their own.
-
-    Args:
-        config: they were played in.
-        starts: (n, 3) the balls' centres at the beginning, metres.
-        forces: (T, 2) newtons for each, of any lengths, those of actions of the configured mode;
-            an episode that ends earlier is shorter.
-        player: who played, in words.
-        seeds: of each, if known.
-        intro: whether their keys worked only after the intro.
-    """
-    if len(forces) == 0:
-        return []
-    simulation = Simulation(replace(config, num_threads=1), len(forces))
-    place_at_starts(simulation, starts, intro)
-    recorder = Recorder(simulation, player)
-    for row in range(len(forces)):
-        recorder.begin([row], seed=None if seeds is None else seeds[row])
-    lengths = np.array([len(force) for force in forces])
-    padded = np.zeros((int(lengths.max()), len(forces), 2))
-    for row, force in enumerate(forces):
-        padded[: len(force), row] = force
-    for step, force in enumerate(padded):
-        transition = simulation.step(force, hold=lengths <= step)
-        recorder.record(force, transition.reward)
-    return [recorder.replay(row) for row in range(len(forces))]

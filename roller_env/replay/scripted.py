@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from roller_env import checks
+from roller_env.arrays import Float64
 from roller_env.game.actions import DIRECTIONS, forces
 from roller_env.game.observations import STATE_ENTRIES, layout
 from roller_env.level import Level
@@ -25,8 +26,6 @@ from roller_env.pieces.plate import PLATE
 from roller_env.replay.contents import Replay
 from roller_env.replay.playback import Playback
 from roller_env.simulation import Simulation
-
-Float64 = npt.NDArray[np.float64]
 
 PLAYER: Final = "scripted player"
 """Who played, in a replay's words."""
@@ -55,8 +54,8 @@ SHAFT_M: Final = 1.5
 PATIENCE_S: Final = 8.0
 """After this long it gives a coin up."""
 
-SLIP_STEPS: Final = 5
-"""Control steps that a slip lasts: a quarter of a second at 20 a second."""
+NOISE_STEPS: Final = 5
+"""Control steps for which an action that is noise is held: a quarter of a second at 20 a second."""
 
 _OPEN_M: Final = 0.02
 """A gate that is this near to where it goes counts as open."""
@@ -83,22 +82,22 @@ class Stop:
 class ScriptedPlayer:
     """Plays the game in row 0 of a simulation, from its start."""
 
-    def __init__(self, level: Level, slips: float = 0.0, seed: int = 0):
+    def __init__(self, level: Level, action_noise: float = 0.0, seed: int = 0):
         """Make a plan for a level.
 
         Args:
             level: to play.
-            slips: share of the steps, 0 to 1, in which it holds any keys at all, as the seed says;
-                each time for `SLIP_STEPS`.
-            seed: of the slips.
+            action_noise: fraction of the steps, 0 to 1, in which it holds any keys at all, as the
+                seed says; each time for `NOISE_STEPS`.
+            seed: of the noise.
 
         Raises:
             ValueError: the level has no route.
         """
-        if not 0.0 <= slips <= 1.0:
-            raise ValueError(f"slips: found {slips}; must be a share from 0 to 1")
-        self._slips = slips
-        self._slip_left = self._slip = 0
+        self._action_noise = checks.number(
+            "action_noise", action_noise, 0.0, 1.0, "a fraction from 0 to 1"
+        )
+        self._noise_left = self._noise = 0
         self._rng = np.random.default_rng(seed)
         self._level = level
         self._stops = itinerary(level)
@@ -121,19 +120,19 @@ class ScriptedPlayer:
         wanted = way / max(distance, 1e-9) * speed
         mass = simulation.compiled.level.ball.mass_kg
         push = mass * (wanted - velocity) / RESPONSE_S
-        best = self._slipped(int(np.linalg.norm(_PUSHES - push, axis=1).argmin()))
+        best = self._with_noise(int(np.linalg.norm(_PUSHES - push, axis=1).argmin()))
         return _PUSHES[best : best + 1].copy()
 
-    def _slipped(self, direction: int) -> int:
-        """Return the direction meant, or any one during a slip."""
-        if self._slips > 0.0 and self._slip_left == 0:
-            if self._rng.random() >= self._slips / SLIP_STEPS:
+    def _with_noise(self, direction: int) -> int:
+        """Return the direction chosen, or any one where noise takes its place."""
+        if self._action_noise > 0.0 and self._noise_left == 0:
+            if self._rng.random() >= self._action_noise / NOISE_STEPS:
                 return direction
-            self._slip, self._slip_left = int(self._rng.integers(len(_PUSHES))), SLIP_STEPS
-        if self._slip_left == 0:
+            self._noise, self._noise_left = int(self._rng.integers(len(_PUSHES))), NOISE_STEPS
+        if self._noise_left == 0:
             return direction
-        self._slip_left -= 1
-        return self._slip
+        self._noise_left -= 1
+        return self._noise
 
     def _go_on(self, simulation: Simulation, ball: Float64) -> None:
         """Turn to the next stop when this one is done with."""
@@ -183,11 +182,11 @@ class ScriptedPlayer:
         return False
 
 
-def meant(replay: Replay) -> Float64:
-    """Return the force of the keys that the player would have held in every step of a replay.
+def relabelled(replay: Replay) -> Float64:
+    """Return the force of the keys that the player, asked again, holds in every step of a replay.
 
-    Of its own replays that is what it meant where it slipped, and elsewhere what it did. To learn
-    what was meant from states that noise has led to is DART (Laskey et al. 2017).
+    Of its own replays that is what it did but for the action noise. To learn an expert's actions in
+    states that noise has led to is DART (Laskey et al. 2017).
 
     Args:
         replay: of a level with a route, by whomever.

@@ -19,14 +19,13 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 from tqdm import tqdm
 
+from roller_env.arrays import Bool, Float64, Int64
 from roller_env.training.checkpoint import Progress, save_checkpoint
 from roller_env.training.config import CloningConfig, TrainingConfig
 from roller_env.training.demonstrations import Demonstration, chosen
 from roller_env.training.files import RunFiles
 from roller_env.training.normalisation import WHOLE, statistics
 from roller_env.training.ppo import make_environments, new_model
-
-Float64 = npt.NDArray[np.float64]
 
 STATISTICS_ROLLOUTS: Final = 10
 """The demonstrations' mean and variance of the observations weigh as much as those of so many
@@ -102,7 +101,7 @@ def clone(
     """
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(demonstrations))
-    count = max(1, round(config.held_out_share * len(demonstrations)))
+    count = max(1, round(config.held_out_fraction * len(demonstrations)))
     learnt = [demonstrations[i] for i in order[count:]]
     normaliser = model.get_vec_normalize_env()
     assert normaliser is not None
@@ -159,7 +158,7 @@ class _Samples:
     def __len__(self) -> int:
         return len(self.actions)
 
-    def rows(self, numbers: npt.NDArray[np.int64]) -> _Samples:
+    def rows(self, numbers: Int64) -> _Samples:
         rows = torch.from_numpy(numbers)
         return _Samples(chosen(self.observations, rows), self.actions[rows], self.returns[rows])
 
@@ -206,13 +205,11 @@ def _accuracy(model: PPO, data: _Samples) -> float:
     return float(_same(model.action_space, actions.numpy(), data.actions.numpy()).mean())
 
 
-def _same(
-    space: spaces.Space[Any], one: npt.NDArray[Any], other: npt.NDArray[Any]
-) -> npt.NDArray[np.bool_]:
+def _same(space: spaces.Space[Any], one: npt.NDArray[Any], other: npt.NDArray[Any]) -> Bool:
     """Say which actions, (n,), are the same; of forces, which are nearest to the same keys."""
     if isinstance(space, spaces.Box):
         one, other = (np.round(np.clip(actions, -1.0, 1.0)) for actions in (one, other))
-    same: npt.NDArray[np.bool_] = (one == other).reshape(len(other), -1).all(axis=1)
+    same: Bool = (one == other).reshape(len(other), -1).all(axis=1)
     return same
 
 

@@ -34,12 +34,18 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from roller_env.envs.sb3 import VecSnapshot
 from roller_env.game.cameras import MODES
+from roller_env.game.result import REWARD_TERMS
 from roller_env.problems import shown
 from roller_env.simulation import Snapshot
 from roller_env.training.config import TrainingConfig
+from roller_env.training.curriculum import (
+    CurriculumSnapshot,
+    StartStateCurriculum,
+    joined,
+    separate,
+)
 from roller_env.training.files import RunError, read_whole, write_atomically
 from roller_env.training.normalisation import statistics
-from roller_env.training.practice import PracticeSnapshot, PracticeStarts, joined, separate
 
 Tree = dict[str, Any]
 """Names to arrays, to JSON's values, or to such trees."""
@@ -52,6 +58,28 @@ _HEADER: Final = b"roller-checkpoint-2 sha256 "
 _HEADER_LENGTH: Final = len(_HEADER) + hashlib.sha256().digest_size * 2 + 1
 _STATE, _ARRAYS = "state.json", "arrays.safetensors"
 _BETWEEN_NAMES: Final = "/"
+_RENAMED: Final = {
+    "coin_taken": "coin/taken",
+    "points": "coin/collected",
+    "plate_struck": "plate/struck",
+    "plate_down": "plate/down",
+    "gate_opening": "signals",
+    "thrust_s": "lift_pad/thrust_s",
+    "trigger_spent": "camera_trigger/spent",
+    "camera_delay_s": "camera_trigger/delay_s",
+    "camera_mode": "camera/mode",
+    "camera_x": "camera/x",
+    "waypoint": "shaping/waypoint",
+}
+_NEW: Final = {
+    "total_reward": np.zeros(()),
+    "reward_terms": np.zeros(len(REWARD_TERMS)),
+    "shaping/potential": np.zeros(()),
+    "checkpoint/last": np.array(-1),
+}
+"""Arrays of a game's state by the names that they had in checkpoints of before, and those that were
+not there, as one env has them at the start."""
+
 _VARYING: Final = ("physics", "game", "level_of_row", "generators")
 """Of a `Snapshot`; its other fields are what the configuration says."""
 
@@ -159,7 +187,7 @@ def load_checkpoint(file: Path) -> Checkpoint:
             file=file,
             config=TrainingConfig.model_validate(facts["config"]),
             progress=Progress(int(progress["steps"]), float(progress["wall_s"])),
-            state=_nested({**facts["state"], **arrays}),
+            state=_nested({**facts["state"], **_of_today(arrays)}),
         )
     except (zipfile.BadZipFile, SafetensorError, ValidationError) as error:
         raise _damaged(file, str(error)) from None
@@ -174,6 +202,27 @@ def _members(body: bytes) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
             if container.getinfo(name).file_size > len(body):
                 raise ValueError(f"{name} is larger than the file")
         return from_json(container.read(_STATE)), safetensors.numpy.load(container.read(_ARRAYS))
+
+
+def _of_today(arrays: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+    """Return a checkpoint's arrays under the names that a game's state has now.
+
+    What games had not before begins at 0: nothing but what an episode's last info tells depends on
+    it, or it is found again when the game is restored.
+    """
+    today: dict[str, npt.NDArray[Any]] = {}
+    for name, values in arrays.items():
+        game, _, leaf = name.rpartition(_BETWEEN_NAMES)
+        if game.endswith("game"):
+            leaf = _RENAMED.get(leaf, leaf)
+        today[f"{game}{_BETWEEN_NAMES}{leaf}" if game else leaf] = values
+    for name, steps in arrays.items():
+        game, _, leaf = name.rpartition(_BETWEEN_NAMES)
+        if game.endswith("game") and leaf == "steps":
+            for new, value in _NEW.items():
+                every = np.repeat(value[None], len(steps), axis=0)
+                today.setdefault(f"{game}{_BETWEEN_NAMES}{new}", every)
+    return today
 
 
 def _damaged(file: Path, fault: str) -> CheckpointError:
@@ -206,7 +255,7 @@ def _state(model: PPO) -> Tree:
             "rewards": _moments(normaliser.ret_rms),
             "returns": normaliser.returns,
         },
-        "environments": _of_practice(environments.snapshot()),
+        "environments": _of_curriculum(environments.snapshot()),
         "random": _random_state(),
     }
 
@@ -233,16 +282,16 @@ def _set_state(model: PPO, state: Tree) -> None:
         _set_moments(entry, state["normaliser"]["observations"][name])
     _set_moments(normaliser.ret_rms, state["normaliser"]["rewards"])
     normaliser.returns = state["normaliser"]["returns"]
-    environments.restore(_practice(state["environments"], environments.snapshot()))
+    environments.restore(_curriculum(state["environments"], environments.snapshot()))
     # Last, because making and resetting a learner draws numbers.
     _set_random_state(state["random"])
 
 
-def _wrappers(model: PPO) -> tuple[VecNormalize, PracticeStarts]:
+def _wrappers(model: PPO) -> tuple[VecNormalize, StartStateCurriculum]:
     normaliser = model.get_vec_normalize_env()
     assert normaliser is not None
     environments = normaliser.venv
-    assert isinstance(environments, PracticeStarts)
+    assert isinstance(environments, StartStateCurriculum)
     return normaliser, environments
 
 
@@ -259,7 +308,7 @@ def _set_moments(entry: RunningMeanStd, moments: Tree) -> None:
     entry.count = float(moments["count"])
 
 
-def _of_practice(snapshot: PracticeSnapshot) -> Tree:
+def _of_curriculum(snapshot: CurriculumSnapshot) -> Tree:
     waypoints = [waypoint for waypoint, games in snapshot.games.items() for _ in games]
     games = [game for games in snapshot.games.values() for game in games]
     return {
@@ -275,7 +324,7 @@ def _of_practice(snapshot: PracticeSnapshot) -> Tree:
     }
 
 
-def _practice(tree: Tree, own: PracticeSnapshot) -> PracticeSnapshot:
+def _curriculum(tree: Tree, own: CurriculumSnapshot) -> CurriculumSnapshot:
     """Return the snapshot that a tree is, of the kind that the environments' own is."""
     games = own.environments.games
     if tree["level"] != games.level.model_dump_json():
@@ -285,7 +334,7 @@ def _practice(tree: Tree, own: PracticeSnapshot) -> PracticeSnapshot:
         rows = separate(_snapshot(tree["kept"], games, len(tree["kept_at"])))
         for waypoint, game in zip(tree["kept_at"], rows, strict=True):
             kept.setdefault(int(waypoint), []).append(game)
-    return PracticeSnapshot(
+    return CurriculumSnapshot(
         environments=VecSnapshot(
             games=_snapshot(tree["games"], games, len(tree["returns"])),
             returns=tree["returns"],

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 import yaml
 from pydantic import (
@@ -14,21 +16,28 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    JsonValue,
     Strict,
     ValidationError,
+    ValidationInfo,
+    field_serializer,
     field_validator,
     model_validator,
 )
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from roller_env.config import MAX_ENVS, make_config
+from roller_env.checks import Refused, messages_of, nearest
+from roller_env.config import MAX_ENVS, EnvConfig, LevelSource
 from roller_env.envs.spaces import action_space, observation_space
-from roller_env.problems import Problem, listed
+from roller_env.problems import FieldPath, Problem, listed
 from roller_env.training.config_source import ConfigError, ConfigSource
 
 MAX_STEPS: Final = 10**12
 MAX_ROLLOUT: Final = 10**8
 """Samples of a rollout: they are in memory, some hundred bytes each."""
+
+_OPTIONS: Final = tuple(name for name in EnvConfig().keywords() if name != "level")
+"""Of an environment; the level is said of the training."""
 
 _LONG: Final = 64
 """Characters of a value that a message shows."""
@@ -55,6 +64,20 @@ Name = Annotated[str, Field(min_length=1, max_length=1_000), AfterValidator(_pri
 
 class _Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    former_names: ClassVar[Mapping[str, str]] = {}
+    """Fields' names of before, which are still taken, and what they are now."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _renamed(cls, given: Any) -> Any:
+        if not isinstance(given, Mapping):
+            return given
+        former = [old for old, new in cls.former_names.items() if old in given and new not in given]
+        for old in former:
+            message = f"{old} is called {cls.former_names[old]} now"
+            warnings.warn(message, DeprecationWarning, stacklevel=2)
+        return {cls.former_names[n] if n in former else n: value for n, value in given.items()}
 
 
 class PPOConfig(_Frozen):
@@ -105,13 +128,15 @@ class CloningConfig(_Frozen):
             on the episodes held out.
         batch_size: decisions of one gradient step.
         learning_rate: of Adam.
-        held_out_share: of the episodes, not learnt from; one at least.
+        held_out_fraction: of the episodes, not learnt from; one episode at least.
     """
+
+    former_names: ClassVar = {"held_out_share": "held_out_fraction"}
 
     epochs: Count = 50
     batch_size: Count = 256
     learning_rate: PositiveFloat = 1e-3
-    held_out_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
+    held_out_fraction: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
 
 
 class TrainingConfig(_Frozen):
@@ -119,13 +144,17 @@ class TrainingConfig(_Frozen):
 
     Attributes:
         level: name or path of a level, as ``Roller/Level-v0`` takes it.
-        environment: options of the environment (``reward``, ``observation``, ...), those of
-            `roller_env.config.EnvConfig`; ``reward_weights`` by name.
         algorithm: how it learns.
+        ppo: what the algorithm is told.
+        environment: what it learns in. It is given as the options that are not the defaults; the
+            discount is by default the learner's.
+        evaluation_environment: what it is judged in. It is given as the options that are other ones
+            than in training, such as ``physics: default`` after a training with ``fast``.
         seed: of the environments, the network's initial weights and the order of the samples.
         num_envs: environments that are stepped together.
-        practice_share: of the episodes that begin at a waypoint of the route that the agent has
-            reached before, not at the level's start; see `roller_env.training.practice`.
+        start_state_curriculum: fraction of the training's episodes that begin at a waypoint of the
+            route that the agent has reached before, not at the level's start; see
+            `roller_env.training.curriculum`.
         total_steps: environment steps, over all environments, after which training ends.
         wall_clock_budget_s: training ends after this time at the latest; None for no limit.
             A run that ends by time is not repeatable bit for bit on another machine.
@@ -134,21 +163,23 @@ class TrainingConfig(_Frozen):
         normalise_rewards: with the running variance of the discounted return.
         torch_threads: of the network's arithmetic.
         evaluation_episodes: played by the trained policy for the evaluation table.
-        evaluation_environment: options that are other ones then, such as ``physics: default``
-            after a training with ``fast``.
         evaluation_replays: whether every episode of the evaluation is kept as a replay.
         demonstrations: replays or a Minari data set that the policy learns from before its first
             step, as `roller_env.training.demonstrations.load_demonstrations` takes them.
         cloning: how it learns from them.
-        ppo: what the algorithm is told.
     """
 
+    former_names: ClassVar = {"practice_share": "start_state_curriculum"}
+
     level: Name
-    environment: Mapping[str, Any] = Field(default_factory=dict)
     algorithm: Literal["ppo"] = "ppo"
+    ppo: PPOConfig = PPOConfig()
+    # Given as options, which are completed by the fields above them.
+    environment: EnvConfig = Field({}, validate_default=True)
+    evaluation_environment: EnvConfig = Field({}, validate_default=True)
     seed: Annotated[WholeNumber, Field(ge=0, lt=2**31)] = 0
     num_envs: Annotated[WholeNumber, Field(gt=0, le=MAX_ENVS)] = 256
-    practice_share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    start_state_curriculum: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     total_steps: Annotated[WholeNumber, Field(gt=0, le=MAX_STEPS)] = 4_000_000
     wall_clock_budget_s: PositiveFloat | None = None
     checkpoint_interval_s: NonNegativeFloat = 30.0
@@ -156,11 +187,9 @@ class TrainingConfig(_Frozen):
     normalise_rewards: bool = True
     torch_threads: Annotated[WholeNumber, Field(gt=0, le=1024)] = 1
     evaluation_episodes: Annotated[WholeNumber, Field(ge=2, le=10**6)] = 100
-    evaluation_environment: Mapping[str, Any] = Field(default_factory=dict)
     evaluation_replays: bool = False
     demonstrations: Name | None = None
     cloning: CloningConfig = CloningConfig()
-    ppo: PPOConfig = PPOConfig()
 
     @model_validator(mode="after")
     def _batches_fill_the_rollout(self) -> TrainingConfig:
@@ -191,25 +220,32 @@ class TrainingConfig(_Frozen):
             )
         return self
 
-    @field_validator("environment", "evaluation_environment")
+    @field_validator("environment", "evaluation_environment", mode="plain")
     @classmethod
-    def _environment_takes_these(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
-        if "level" in options:
-            raise ValueError("level: is a field of the training itself; remove it here")
-        try:
-            make_config(**options)
-        except TypeError as error:  # an unknown option, which pydantic would let through
-            raise ValueError(str(error)) from None
-        return options
+    def _completed(cls, given: object, info: ValidationInfo) -> EnvConfig:
+        # What was refused itself is not there.
+        known = info.data
+        base = _default_env(known.get("level", EnvConfig.level), known.get("ppo", PPOConfig()))
+        if info.field_name == "evaluation_environment":
+            base = known.get("environment", base)
+        if isinstance(given, EnvConfig):
+            return replace(given, level=base.level)
+        if not isinstance(given, Mapping):
+            raise ValueError(f"found {_short(given)}; must be a mapping of options")
+        return _with_options(base, given)
+
+    @field_serializer("environment")
+    def _options(self, environment: EnvConfig) -> dict[str, JsonValue]:
+        return environment.differences(_default_env(self.level, self.ppo))
+
+    @field_serializer("evaluation_environment")
+    def _evaluation_options(self, environment: EnvConfig) -> dict[str, JsonValue]:
+        return environment.differences(self.environment)
 
     @model_validator(mode="after")
     def _the_agent_fits_into_its_evaluation(self) -> TrainingConfig:
-        trained, judged = (
-            make_config(level=self.level, **options)
-            for options in (self.environment_options, self.evaluation_options)
-        )
         for space in (observation_space, action_space):
-            if space(trained) != space(judged):
+            if space(self.environment) != space(self.evaluation_environment):
                 name = space.__name__.replace("_space", "")
                 message = (
                     "evaluation_environment: an agent can be judged only with the observations "
@@ -218,15 +254,13 @@ class TrainingConfig(_Frozen):
                 raise PydanticCustomError("other_spaces", message, {"name": name})
         return self
 
-    @property
-    def environment_options(self) -> dict[str, Any]:
-        """The options of the training's environments; they discount as the learner does."""
-        return {"discount": self.ppo.gamma, **self.environment}
-
-    @property
-    def evaluation_options(self) -> dict[str, Any]:
-        """The options of the evaluation's environments."""
-        return {**self.environment_options, **self.evaluation_environment}
+    def on_level(self, level: str) -> TrainingConfig:
+        """Return the configuration with another level, its name or path."""
+        changes = {
+            name: replace(getattr(self, name), level=level)
+            for name in ("environment", "evaluation_environment")
+        }
+        return self.model_copy(update={"level": level, **changes})
 
     @property
     def steps_per_update(self) -> int:
@@ -239,12 +273,45 @@ class TrainingConfig(_Frozen):
 
     def differences(self, other: TrainingConfig) -> list[str]:
         """Return ``field: mine, theirs`` for every field in which the two differ."""
-        mine, theirs = (_flat(config.model_dump(mode="json")) for config in (self, other))
+        mine, theirs = (
+            _flat(
+                config.model_dump(mode="json")
+                | {"environment": replace(config.environment, level=EnvConfig.level).to_json()}
+            )
+            for config in (self, other)
+        )
         return [
             f"{name}: {mine.get(name)!r}, {theirs.get(name)!r}"
             for name in sorted(mine.keys() | theirs.keys())
             if mine.get(name) != theirs.get(name)
         ]
+
+
+def _default_env(level: LevelSource, ppo: PPOConfig) -> EnvConfig:
+    """Return the environment of which a configuration says nothing."""
+    return EnvConfig(level=level, discount=ppo.gamma)
+
+
+def _with_options(base: EnvConfig, options: Mapping[str, Any]) -> EnvConfig:
+    """Return an environment with other options.
+
+    Raises:
+        ValueError: some are unknown or not allowed; a message each, all of them.
+    """
+    refused = [
+        f"{name}: is a field of the training itself; remove it here"
+        if name == "level"
+        else f"{name}: unknown option; known are {listed(_OPTIONS)}{nearest(str(name), _OPTIONS)}"
+        for name in options
+        if name not in _OPTIONS
+    ]
+    try:
+        made = replace(base, **{name: v for name, v in options.items() if name in _OPTIONS})
+    except ValueError as error:
+        raise Refused([*refused, *messages_of(error)]) from None
+    if refused:
+        raise Refused(refused)
+    return made
 
 
 class _Dumper(yaml.SafeDumper):
@@ -274,33 +341,68 @@ def load_config(file: str | os.PathLike[str], overrides: Sequence[str] = ()) -> 
     try:
         return TrainingConfig.model_validate(source.content)
     except ValidationError as error:
-        problems = [_problem(details, source) for details in error.errors(include_url=False)]
+        problems = [
+            problem
+            for details in error.errors(include_url=False)
+            for problem in _problems(details, source)
+        ]
         raise ConfigError(sorted(problems, key=lambda problem: problem.line or 0)) from None
 
 
-def _problem(details: ErrorDetails, source: ConfigSource) -> Problem:
+def _problems(details: ErrorDetails, source: ConfigSource) -> list[Problem]:
     path, message, found = details["loc"], details["msg"], details["input"]
     if details["type"] == "extra_forbidden":
         models: dict[tuple[Any, ...], type[BaseModel]] = {
             ("ppo",): PPOConfig,
             ("cloning",): CloningConfig,
         }
-        written, known = str(path[-1]), tuple(models.get(path[:-1], TrainingConfig).model_fields)
-        message, where = (
-            f"unknown field; known are {listed(known)}",
-            source.where(path, of_key=True),
-        )
-        return Problem(path, message, **where, written=written, known=known)
+        known = tuple(models.get(path[:-1], TrainingConfig).model_fields)
+        return [_unknown(path, known, source)]
     if details["type"] == "value_error":
-        message = str(details["ctx"]["error"])
-        # An option of the environment, whose message begins with its name.
-        option, colon, _ = message.partition(":")
-        if isinstance(found, dict) and colon and option in found:
-            path, message = (*path, option), message.removeprefix(f"{option}: ")
+        messages = messages_of(details["ctx"]["error"])
+        if isinstance(found, dict):
+            return [_of_option(path, found, one, source) for one in messages]
+        (message,) = messages
     elif path and not isinstance(found, dict):
         message = f"{message}; found {_short(found)}"
         if isinstance(found, str) and found.replace("_", "").isdecimal() and "_" in found:
             message += " (write it without '_')"
+    path = _as_written(path, source.content)
+    return [Problem(path, message, **source.where(path, of_key=False))]
+
+
+def _as_written(path: FieldPath, content: object) -> FieldPath:
+    """Return the path of a field as the file has it, where it may have a name of before."""
+    models = (TrainingConfig, CloningConfig)
+    former = {new: old for model in models for old, new in model.former_names.items()}
+    written: list[str | int] = []
+    for part in path:
+        known = content if isinstance(content, Mapping) else {}
+        is_former = part not in known and former.get(str(part)) in known
+        written.append(former[str(part)] if is_former else part)
+        content = known.get(written[-1])
+    return tuple(written)
+
+
+def _unknown(path: FieldPath, known: tuple[str, ...], source: ConfigSource) -> Problem:
+    message = f"unknown field; known are {listed(known)}"
+    where = source.where(path, of_key=True)
+    return Problem(path, message, **where, written=str(path[-1]), known=known)
+
+
+def _of_option(
+    path: FieldPath, options: Mapping[str, Any], message: str, source: ConfigSource
+) -> Problem:
+    """Return the problem with an option of an environment, whose name its message begins with."""
+    name, _, said = message.partition(": ")
+    if name in options and name not in _OPTIONS and name != "level":
+        return _unknown((*path, name), _OPTIONS, source)
+    at: Any = options
+    for part in name.split("."):
+        # An option that is not given itself is at fault beside one that is.
+        if not isinstance(at, Mapping) or part not in at:
+            break
+        at, path, message = at[part], (*path, part), said
     return Problem(path, message, **source.where(path, of_key=False))
 
 

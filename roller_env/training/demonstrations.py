@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 from tqdm import tqdm
 
+from roller_env.arrays import Float64
 from roller_env.config import EnvConfig, make_config
-from roller_env.envs.spaces import action_space, observation_space
+from roller_env.envs.spaces import Observations, action_mode, observation_space
 from roller_env.game.actions import ActionMode, forces
 from roller_env.level import load_level
 from roller_env.problems import shown
 from roller_env.replay import Replay, ReplayError, load_replay
-from roller_env.replay.actions import actions_of
+from roller_env.replay.actions import recorded_actions
 from roller_env.replay.experience import Experience, experiences
 from roller_env.replay.file import SUFFIX
-from roller_env.replay.scripted import PLAYER, meant
+from roller_env.replay.scripted import PLAYER, relabelled
 from roller_env.training.config import TrainingConfig
-from roller_env.training.normalisation import Observations
 
 
 class DemonstrationError(ValueError):
@@ -43,7 +43,7 @@ class Demonstration:
 
     observations: Observations
     actions: npt.NDArray[Any]
-    rewards: npt.NDArray[np.float64] | None = None
+    rewards: Float64 | None = None
 
     def __len__(self) -> int:
         """Return the number of decisions."""
@@ -72,7 +72,7 @@ def load_demonstrations(source: str, config: TrainingConfig) -> list[Demonstrati
         DemonstrationError: there are none, they are of another level, they cannot be read, or
             other observations than the training's are in them.
     """
-    wanted = make_config(level=config.level, **config.environment_options)
+    wanted = config.environment
     path = Path(source)
     try:
         if path.is_file() or list(path.glob(f"*{SUFFIX}")):
@@ -113,12 +113,12 @@ def _from_replays(replays: Sequence[Replay], wanted: EnvConfig) -> list[Demonstr
 
 
 def _worth_imitating(experience: Experience, mode: ActionMode) -> npt.NDArray[Any]:
-    """Return an episode's actions; the scripted player can tell what it meant where it slipped."""
+    """Return an episode's actions; those of the scripted player are relabelled: without noise."""
     replay = experience.replay
     if replay.player != PLAYER or replay.level.route is None:
         return experience.actions
     # The episode is without its intro.
-    return actions_of(mode, meant(replay)[len(replay) - len(experience) :])
+    return recorded_actions(mode, relabelled(replay)[len(replay) - len(experience) :])
 
 
 def _thinned(demonstration: Demonstration, ratio: float) -> Demonstration:
@@ -185,12 +185,15 @@ def _from_minari(data_set: Any, wanted: EnvConfig) -> list[Demonstration]:
         for name in ("reward", "reward_weights", "discount")
     )
     ratio = wanted.control_dt_s / recorded.control_dt_s
-    mode = _action_mode(data_set, wanted)
+    mode = action_mode(data_set.action_space)
+    if mode is None:
+        found = _brief(data_set.action_space)
+        raise DemonstrationError(f"{data_set.id}: its actions, {found}, are not of this game")
     return [
         _thinned(
             Demonstration(
                 observations=episode.observations,
-                actions=actions_of(wanted.action, forces(mode, episode.actions)),
+                actions=recorded_actions(wanted.action, forces(mode, episode.actions)),
                 rewards=np.asarray(episode.rewards, np.float64) if is_rewarded_so else None,
             ),
             ratio,
@@ -198,15 +201,6 @@ def _from_minari(data_set: Any, wanted: EnvConfig) -> list[Demonstration]:
         for episode in data_set.iterate_episodes()
         if len(episode.actions)
     ]
-
-
-def _action_mode(data_set: Any, wanted: EnvConfig) -> ActionMode:
-    """Return which of the game's action modes a data set's actions are of."""
-    for mode in get_args(ActionMode):
-        if data_set.action_space == action_space(replace(wanted, action=mode)):
-            return cast("ActionMode", mode)
-    found = _brief(data_set.action_space)
-    raise DemonstrationError(f"{data_set.id}: its actions, {found}, are not of this game")
 
 
 def _brief(space: gym.Space[Any]) -> str:

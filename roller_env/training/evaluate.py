@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import NormalDist
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-import numpy.typing as npt
+from gymnasium.vector import AutoresetMode
 
-from roller_env.envs.sb3 import RollerVecEnv
+from roller_env.envs.vector import RollerVectorEnv
 from roller_env.game.actions import forces
+from roller_env.game.result import EpisodeResult
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
+from roller_env.replay import Recorder, Replay, ReplayError, save_replay
+from roller_env.replay.contents import check_length
+from roller_env.replay.file import SUFFIX
 from roller_env.training.files import RunError
 from roller_env.training.policy import Policy
 
 CONFIDENCE: Final = 0.95
-MAX_ROWS: Final = 256
-"""Episodes played together; more are played one after another in the same rows."""
+MAX_ENVS: Final = 256
+"""Episodes played together; more are played one after another in the same environments."""
 
 MAX_EPISODES: Final = 1_000_000
 
@@ -38,58 +43,25 @@ class Estimate:
 
 
 @dataclass(frozen=True, slots=True)
-class Episode:
-    """One episode, as it ended.
-
-    Attributes:
-        row: environment that played it.
-        success: at the finish.
-        fall: below the kill height.
-        diverged: the physics failed; neither of the above.
-        score_percent: coins over the level's coins, by the game's own rule.
-        coins: collected.
-        time_s: simulated.
-        total_reward: undiscounted sum.
-        steps: control steps.
-        path: (steps, 3) float64 ball centre before every control step, world frame, metres.
-        force_n: (steps, 2) float64 newtons of the keys in every control step.
-    """
-
-    row: int
-    success: bool
-    fall: bool
-    diverged: bool
-    score_percent: float
-    coins: int
-    time_s: float
-    total_reward: float
-    steps: int
-    path: npt.NDArray[np.float64]
-    force_n: npt.NDArray[np.float64]
-
-    @property
-    def outcome(self) -> str:
-        """One of ``finish``, ``fall``, ``diverged``, ``time limit``."""
-        if self.success:
-            return "finish"
-        if self.fall:
-            return "fall"
-        return "diverged" if self.diverged else "time limit"
-
-
-@dataclass(frozen=True, slots=True)
 class Evaluation:
     """The episodes of one agent on one level.
 
     Attributes:
         level: where they were played.
         seed: the environments'.
-        episodes: in the order of their rows.
+        episodes_per_env: that every environment played, one after another.
+        replays: of the episodes: all of the first environment, then all of the second, and so on.
     """
 
     level: Level
     seed: int
-    episodes: tuple[Episode, ...]
+    episodes_per_env: int
+    replays: tuple[Replay, ...]
+
+    @property
+    def results(self) -> tuple[EpisodeResult, ...]:
+        """How the episodes ended, in their order."""
+        return tuple(replay.result for replay in self.replays)
 
     @property
     def coins_in_level(self) -> int:
@@ -98,74 +70,110 @@ class Evaluation:
 
     def table(self) -> dict[str, Estimate]:
         """Return the measures by name, in the order in which they are shown."""
-        finished = [episode.time_s for episode in self.episodes if episode.success]
+        results = self.results
+        finished = [result.time_s for result in results if result.success]
         return {
-            "success rate": proportion(self._count(lambda episode: episode.success), len(self)),
-            "score (%)": mean_with_interval([e.score_percent for e in self.episodes]),
-            "coins": mean_with_interval([e.coins for e in self.episodes]),
-            "time of an episode (s)": mean_with_interval([e.time_s for e in self.episodes]),
+            "success rate": proportion(len(finished), len(self)),
+            "score (%)": mean_with_interval([r.score_percent for r in results]),
+            "coins": mean_with_interval([r.coins for r in results]),
+            "time of an episode (s)": mean_with_interval([r.time_s for r in results]),
             "time to the finish (s)": mean_with_interval(finished),
-            "fall rate": proportion(self._count(lambda episode: episode.fall), len(self)),
-            "total reward": mean_with_interval([e.total_reward for e in self.episodes]),
+            "fall rate": proportion(sum(r.fall for r in results), len(self)),
+            "total reward": mean_with_interval([r.total_reward for r in results]),
         }
 
-    def __len__(self) -> int:
-        return len(self.episodes)
+    def save_replays(self, directory: Path) -> list[Path]:
+        """Write every episode as a replay and return the files, ``episode-0000.replay`` and so on.
 
-    def _count(self, holds: Callable[[Episode], bool]) -> int:
-        return sum(map(holds, self.episodes))
+        Raises:
+            OSError: one cannot be written.
+        """
+        return [
+            save_replay(replay, directory / f"episode-{number:04d}{SUFFIX}")
+            for number, replay in enumerate(self.replays)
+        ]
+
+    def __len__(self) -> int:
+        return len(self.replays)
 
 
 def evaluate(
-    policy: Policy, environments: RollerVecEnv, *, seed: int, episodes_per_row: int = 1
+    policy: Policy,
+    envs: RollerVectorEnv,
+    *,
+    seed: int,
+    episodes_per_env: int = 1,
+    player: str = "",
 ) -> Evaluation:
-    """Play whole episodes.
+    """Play whole episodes, and record them.
 
-    Every row plays the same number. Taking the first so many episodes that end anywhere would
-    favour short ones, and so falls.
+    Every environment plays the same number. Taking the first so many episodes that end anywhere
+    would favour short ones, and so falls.
 
     Args:
         policy: what plays.
-        environments: where; reset with the seed.
+        envs: where; reset with the seed. They reset in the next step, which leaves what has ended
+            where it can be recorded.
         seed: of the environments.
-        episodes_per_row: played one after another.
+        episodes_per_env: played one after another.
+        player: who plays, in words, for whoever reads the replays.
+
+    Raises:
+        RunError: an episode may become longer than a replay can be.
+        ValueError: the environments do not reset in the next step.
     """
-    environments.seed(seed)
-    observations = environments.reset()
-    ended: list[list[Episode]] = [[] for _ in range(environments.num_envs)]
-    paths: list[list[npt.NDArray[np.float64]]] = [[] for _ in range(environments.num_envs)]
-    pushes: list[list[npt.NDArray[np.float64]]] = [[] for _ in range(environments.num_envs)]
-    playing = set(range(environments.num_envs))
-    while playing:
-        positions = environments.simulation.ball_position.copy()
+    check_recordable(envs)
+    if envs.autoreset_mode is not AutoresetMode.NEXT_STEP:
+        raise ValueError(f"envs: found {envs.autoreset_mode}; must be {AutoresetMode.NEXT_STEP}")
+    observations, _ = envs.reset(seed=seed)
+    recorder = Recorder(envs.simulation, player)
+    recorder.begin(np.arange(envs.num_envs))
+    ended: list[list[Replay]] = [[] for _ in range(envs.num_envs)]
+    to_play = np.full(envs.num_envs, episodes_per_env)
+    over = np.zeros(envs.num_envs, dtype=bool)
+    while to_play.any():
         actions = policy(observations)
-        force_n = forces(environments.simulation.config.action, actions)
-        for row in playing:
-            paths[row].append(positions[row])
-            pushes[row].append(force_n[row])
-        observations, _, dones, infos = environments.step(actions)
-        for row in playing.intersection(np.flatnonzero(dones)):
-            path, push = np.array(paths[row]), np.array(pushes[row])
-            ended[row].append(_episode(int(row), infos[row], path, push))
-            paths[row], pushes[row] = [], []
-            if len(ended[row]) == episodes_per_row:
-                playing.remove(row)
+        observations, _, terminated, truncated, _ = envs.step(actions)
+        recorder.record(forces(envs.config.action, actions))
+        # What was over before this step has begun anew in it.
+        recorder.begin(np.flatnonzero(over & (to_play > 0)))
+        over = terminated | truncated
+        for row in np.flatnonzero(over & (to_play > 0)):
+            ended[row].append(recorder.replay(int(row)))
+            to_play[row] -= 1
     return Evaluation(
-        level=environments.level,
+        level=envs.simulation.compiled.level,
         seed=seed,
-        episodes=tuple(episode for row in ended for episode in row),
+        episodes_per_env=episodes_per_env,
+        replays=tuple(replay for one in ended for replay in one),
     )
 
 
-def rows_and_repeats(episodes: int) -> tuple[int, int]:
-    """Return how many rows play how many episodes each, for at least `episodes` in all.
+def check_recordable(envs: RollerVectorEnv) -> None:
+    """Refuse environments whose episodes may become longer than a replay can be.
+
+    Raises:
+        RunError: they may.
+    """
+    config, level = envs.config, envs.simulation.compiled.level
+    steps = math.ceil(level.time_limit_s / config.control_dt_s)
+    try:
+        check_length(config, min(steps, config.max_episode_steps or steps))
+    except ReplayError as error:
+        raise RunError(
+            f"an evaluation keeps its episodes: {error}; set max_episode_steps"
+        ) from None
+
+
+def envs_and_repeats(episodes: int) -> tuple[int, int]:
+    """Return how many environments play how many episodes each, for at least `episodes` in all.
 
     Raises:
         RunError: it is none, or too many.
     """
     if not 1 <= episodes <= MAX_EPISODES:
         raise RunError(f"episodes: found {episodes}; must be 1 to {MAX_EPISODES}")
-    repeats = math.ceil(episodes / MAX_ROWS)
+    repeats = math.ceil(episodes / MAX_ENVS)
     return math.ceil(episodes / repeats), repeats
 
 
@@ -196,24 +204,3 @@ def mean_with_interval(values: Sequence[float]) -> Estimate:
     means = rng.choice(sample, size=(_RESAMPLES, sample.size)).mean(axis=1)
     low, high = np.quantile(means, [0.5 - CONFIDENCE / 2.0, 0.5 + CONFIDENCE / 2.0])
     return Estimate(float(sample.mean()), float(low), float(high))
-
-
-def _episode(
-    row: int,
-    info: dict[str, Any],
-    path: npt.NDArray[np.float64],
-    force_n: npt.NDArray[np.float64],
-) -> Episode:
-    return Episode(
-        row=row,
-        success=bool(info["success"]),
-        fall=bool(info["fall"]),
-        diverged=bool(info["diverged"]),
-        score_percent=float(info["score_percent"]),
-        coins=int(info["coins"]),
-        time_s=float(info["time_s"]),
-        total_reward=float(info["episode"]["r"]),
-        steps=int(info["episode"]["l"]),
-        path=path,
-        force_n=force_n,
-    )

@@ -32,7 +32,8 @@ STEPS: Final = "time/total_timesteps"
 class ContinuingCSV(KVWriter):
     """A CSV file with one header and one row an update, whatever happened in between.
 
-    Columns are those of the first row, so every row must bring the same ones.
+    Columns are those of the first row, so every row must bring the same ones. A file that an
+    earlier version began goes on with the columns that it has.
     """
 
     def __init__(self, file: Path, steps: int) -> None:
@@ -71,7 +72,8 @@ class ContinuingCSV(KVWriter):
         self._stream.close()
 
     def _writer(self) -> csv.DictWriter[str]:
-        return csv.DictWriter(self._stream, self._columns, lineterminator="\n")
+        columns = self._columns
+        return csv.DictWriter(self._stream, columns, lineterminator="\n", extrasaction="ignore")
 
 
 class ContinuingTensorBoard(KVWriter):

@@ -10,7 +10,6 @@ from gymnasium import Space, spaces
 from stable_baselines3.common.policies import ActorCriticPolicy, MultiInputActorCriticPolicy
 from stable_baselines3.common.preprocessing import is_image_space
 
-from roller_env.config import make_config
 from roller_env.envs.spaces import action_space, observation_space
 from roller_env.training.config import TrainingConfig
 
@@ -25,7 +24,7 @@ _ACTIVATIONS: Final[dict[str, type[torch.nn.Module]]] = {
 
 def network_class(config: TrainingConfig) -> type[ActorCriticPolicy]:
     """Return Stable-Baselines3's class of networks for the observations of a configuration."""
-    is_dict = config.environment.get("observation") == "dict"
+    is_dict = config.environment.observation == "dict"
     return MultiInputActorCriticPolicy if is_dict else ActorCriticPolicy
 
 
@@ -43,16 +42,12 @@ def network_spaces(config: TrainingConfig, clip: float | None) -> tuple[Space[An
     Args:
         config: says in what environment.
         clip: largest magnitude of normalised observations; None if they are not normalised.
-
-    Raises:
-        ValueError: the environment's options are not allowed.
     """
-    options = make_config(level=config.level, **config.environment_options)
-    seen = observation_space(options)
+    seen = observation_space(config.environment)
     if clip is not None and is_image_space(seen):
         # As VecNormalize says of pictures that it has normalised.
         seen = spaces.Box(-clip, clip, seen.shape, np.float32)
-    return seen, action_space(options)
+    return seen, action_space(config.environment)
 
 
 def network_of(

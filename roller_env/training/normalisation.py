@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 
-Float64 = npt.NDArray[np.float64]
-Observations = npt.NDArray[np.float32] | dict[str, npt.NDArray[np.float32]]
+from roller_env.arrays import Float32, Float64
+from roller_env.envs.spaces import Observations
 
 WHOLE = ""
 """Name of the observation where it is one array and not a dict of them."""
@@ -51,7 +50,7 @@ class Normalisation:
             return {name: self._entry(name, values) for name, values in observations.items()}
         return self._entry(WHOLE, observations)
 
-    def _entry(self, name: str, values: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    def _entry(self, name: str, values: Float32) -> Float32:
         scaled = (values - self.mean[name]) / np.sqrt(self.variance[name] + self.epsilon)
         return np.clip(scaled, -self.clip, self.clip).astype(np.float32)
 

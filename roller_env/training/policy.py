@@ -28,11 +28,13 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecNormalize
 
 from roller_env import __version__
+from roller_env.arrays import Float64
+from roller_env.envs.spaces import Observations
 from roller_env.problems import field_name, shown
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.files import RunError, RunFiles, read_whole, write_atomically
 from roller_env.training.network import network_of, network_spaces
-from roller_env.training.normalisation import WHOLE, Normalisation, Observations
+from roller_env.training.normalisation import WHOLE, Normalisation
 
 MAX_DESCRIPTION_BYTES: Final = 2**26
 MAX_WEIGHTS_BYTES: Final = 2**31
@@ -267,7 +269,7 @@ def _arrays(listed: _Normalisation | None, space: Space[Any]) -> Normalisation |
     if listed is None:
         return None
     entries = dict(space) if isinstance(space, spaces.Dict) else {WHOLE: space}
-    arrays: dict[str, dict[str, npt.NDArray[np.float64]]] = {}
+    arrays: dict[str, dict[str, Float64]] = {}
     for name in ("mean", "variance"):
         numbers: dict[str, Numbers] = getattr(listed, name)
         found = {entry: len(values) for entry, values in numbers.items()}

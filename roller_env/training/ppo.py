@@ -15,14 +15,16 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecNormalize
 
+from roller_env.envs.infos import TERMS
 from roller_env.envs.sb3 import RollerVecEnv
+from roller_env.game.result import REWARD_TERMS
 from roller_env.training.checkpoint import Progress, load_checkpoint, save_checkpoint
 from roller_env.training.config import TrainingConfig
+from roller_env.training.curriculum import FROM_START, StartStateCurriculum
 from roller_env.training.display import ProgressDisplay
 from roller_env.training.files import RunFiles
 from roller_env.training.logs import STEPS, ContinuingCSV, ContinuingTensorBoard
 from roller_env.training.network import network_class, network_options
-from roller_env.training.practice import FROM_START, PracticeStarts
 
 
 def learn(config: TrainingConfig, files: RunFiles) -> tuple[PPO, Progress]:
@@ -77,15 +79,15 @@ def is_complete(config: TrainingConfig, progress: Progress) -> bool:
     return progress.steps >= config.total_steps or out_of_time
 
 
-def make_environments(config: TrainingConfig) -> PracticeStarts:
+def make_environments(config: TrainingConfig) -> StartStateCurriculum:
     """Return the environments that a configuration trains in."""
     environments = RollerVecEnv(
-        config.level, config.num_envs, seed=config.seed, **config.environment_options
+        num_envs=config.num_envs, seed=config.seed, **config.environment.keywords()
     )
-    return PracticeStarts(environments, config.practice_share, config.seed)
+    return StartStateCurriculum(environments, config.start_state_curriculum, config.seed)
 
 
-def new_model(config: TrainingConfig, environments: PracticeStarts) -> PPO:
+def new_model(config: TrainingConfig, environments: StartStateCurriculum) -> PPO:
     """Return a learner that knows nothing yet."""
     normaliser = VecNormalize(
         environments,
@@ -136,6 +138,10 @@ class _Episodes:
             "rollout/coins": self._mean([info["coins"] for info in self.infos]),
             "rollout/fall_rate": self._mean([info["fall"] for info in self.infos]),
             "rollout/diverged": sum(info["diverged"] for info in self.infos),
+            **{
+                f"reward/{term}": self._mean([info[TERMS][term] for info in self.infos])
+                for term in REWARD_TERMS
+            },
         }
 
     @staticmethod

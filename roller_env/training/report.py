@@ -11,17 +11,15 @@ from typing import Any, Final
 
 import matplotlib
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
+from roller_env.arrays import Float64
 from roller_env.training.config import TrainingConfig
 from roller_env.training.evaluate import CONFIDENCE, Estimate, Evaluation
 from roller_env.training.files import RunFiles, write_atomically
 from roller_env.training.logs import STEPS, read_progress
-
-Float64 = npt.NDArray[np.float64]
 
 _SMOOTHING_SHARE: Final = 1.0 / 40.0
 """Width of the learning curve's Gaussian, as a share of the whole training."""
@@ -36,15 +34,7 @@ _STYLE: Final[dict[Any, Any]] = {
     "grid.color": "#e6e6e6",
 }
 _RATES: Final = frozenset({"success rate", "fall rate"})
-_EPISODE_FIELDS: Final = (
-    "row",
-    "outcome",
-    "score_percent",
-    "coins",
-    "time_s",
-    "total_reward",
-    "steps",
-)
+_RESULT_FIELDS: Final = ("outcome", "score_percent", "coins", "time_s", "total_reward")
 
 
 def write_evaluation(evaluation: Evaluation, config: TrainingConfig, files: RunFiles) -> None:
@@ -62,9 +52,16 @@ def write_evaluation(evaluation: Evaluation, config: TrainingConfig, files: RunF
     write_atomically(files.evaluation, json.dumps(facts, indent=2, allow_nan=False) + "\n")
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(_EPISODE_FIELDS)
-    for episode in evaluation.episodes:
-        writer.writerow([getattr(episode, name) for name in _EPISODE_FIELDS])
+    writer.writerow(["row", *_RESULT_FIELDS, "steps"])
+    for number, replay in enumerate(evaluation.replays):
+        result = replay.result
+        writer.writerow(
+            [
+                number // evaluation.episodes_per_env,
+                *(getattr(result, name) for name in _RESULT_FIELDS),
+                len(replay),
+            ]
+        )
     write_atomically(files.episodes, text.getvalue())
 
 

@@ -16,13 +16,14 @@ from pydantic_core import from_json
 
 from roller_env import __version__
 from roller_env.divergence import reports_in
-from roller_env.envs.sb3 import RollerVecEnv
-from roller_env.problems import shown
+from roller_env.envs.vector import RollerVectorEnv
+from roller_env.problems import printable, shown
+from roller_env.replay.contents import MAX_TEXT
 from roller_env.training.behaviour_cloning import start_from_demonstrations
 from roller_env.training.checkpoint import CheckpointError, Progress, load_checkpoint
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.demonstrations import Demonstration, load_demonstrations
-from roller_env.training.evaluate import Evaluation, evaluate, rows_and_repeats
+from roller_env.training.evaluate import Evaluation, check_recordable, envs_and_repeats, evaluate
 from roller_env.training.files import (
     RunError,
     RunFiles,
@@ -30,10 +31,9 @@ from roller_env.training.files import (
     read_whole,
     write_atomically,
 )
-from roller_env.training.pictures import draw_paths, record_video
+from roller_env.training.pictures import draw_paths, film_episode
 from roller_env.training.policy import Policy, load_policy, save_policy
 from roller_env.training.ppo import learn
-from roller_env.training.replays import save_replays
 from roller_env.training.report import draw_learning_curve, markdown_table, write_evaluation
 
 EVALUATION_SEED_OFFSET: Final = 1_000_000
@@ -97,10 +97,15 @@ def check_playable(config: TrainingConfig) -> None:
 
     Raises:
         LevelError: the level cannot be used.
-        ValueError: an option cannot.
+        RunError: the evaluation's episodes cannot be kept.
+        ValueError: an option cannot be used.
     """
-    for options in (config.environment_options, config.evaluation_options):
-        RollerVecEnv(config.level, 1, **options).close()
+    RollerVectorEnv(1, **config.environment.keywords()).close()
+    judged = RollerVectorEnv(1, **config.evaluation_environment.keywords())
+    try:
+        check_recordable(judged)
+    finally:
+        judged.close()
 
 
 def _train(
@@ -118,38 +123,48 @@ def _train(
     save_policy(model, config, files)
     start_s = time.monotonic()
     policy = load_policy(files.directory)
-    evaluation = evaluate_policy(policy, config, config.evaluation_episodes)
+    player = player_of(files.directory)
+    evaluation = evaluate_policy(policy, config, config.evaluation_episodes, player=player)
     write_evaluation(evaluation, config, files)
     print(markdown_table(evaluation, config), flush=True)
     draw_learning_curve(config, evaluation.coins_in_level, files)
     draw_paths(evaluation, files.paths)
-    record_video(policy, config, evaluation.seed, files.video)
+    film_episode(evaluation, files.video)
     if config.evaluation_replays:
-        player = f"policy {files.directory.name}"
-        save_replays(evaluation, config, files.directory / "replays", player)
+        evaluation.save_replays(files.directory / "replays")
     summary = _summary(config, progress, time.monotonic() - start_s)
     write_atomically(files.summary, json.dumps(summary, indent=2) + "\n")
     return TrainingRun(files, summary, was_finished=False)
 
 
 def evaluate_policy(
-    policy: Policy, config: TrainingConfig, episodes: int, seed: int | None = None
+    policy: Policy,
+    config: TrainingConfig,
+    episodes: int,
+    seed: int | None = None,
+    player: str = "",
 ) -> Evaluation:
     """Play at least `episodes` whole episodes in a configuration's evaluation environment.
 
     Args:
         policy: what plays.
         config: says where; it may be another than the policy was trained with.
-        episodes: rounded up so that all rows play equally many.
+        episodes: rounded up so that all environments play equally many.
         seed: of the environments; by default one the training never used.
+        player: who plays, in words, for whoever reads the replays.
     """
-    rows, repeats = rows_and_repeats(episodes)
+    num_envs, repeats = envs_and_repeats(episodes)
     seed = config.seed + EVALUATION_SEED_OFFSET if seed is None else seed
-    environments = RollerVecEnv(config.level, rows, **config.evaluation_options)
+    envs = RollerVectorEnv(num_envs, **config.evaluation_environment.keywords())
     try:
-        return evaluate(policy, environments, seed=seed, episodes_per_row=repeats)
+        return evaluate(policy, envs, seed=seed, episodes_per_env=repeats, player=player)
     finally:
-        environments.close()
+        envs.close()
+
+
+def player_of(run: Path) -> str:
+    """Return who plays, in a replay's words, when a run's agent does."""
+    return f"policy {printable(run.name)}"[:MAX_TEXT]
 
 
 def _claim(config: TrainingConfig, files: RunFiles, resume: bool) -> None:

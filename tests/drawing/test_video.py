@@ -6,14 +6,12 @@ from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
-import numpy.typing as npt
 import pytest
 from PIL import Image
 
 from roller_env.drawing.canvas import Picture
 from roller_env.drawing.overview import render_overview
-from roller_env.drawing.video import END_S, panel_lines, record_episode, with_panel, write_video
-from roller_env.simulation import Simulation
+from roller_env.drawing.video import panel_lines, with_panel, write_video
 from tests.builders import Game
 from tests.drawing.course import COIN, START, course
 
@@ -44,26 +42,12 @@ def test_a_film_without_frames_is_refused(tmp_path: Path) -> None:
         write_video([], tmp_path / "film.mp4", fps=20)
 
 
-def push(simulation: Simulation) -> npt.NDArray[np.float64]:
-    """Hold W in every game."""
-    return np.tile([5.08, 0.0], (simulation.num_envs, 1))
-
-
-@pytest.mark.usefixtures("opengl")
-def test_a_recorded_episode_shows_every_step_and_stands_still_at_its_end(tmp_path: Path) -> None:
-    simulation = Game(course(time_limit_s=0.5)).simulation
-    file = record_episode(simulation, push, tmp_path / "episode.mp4", size=(96, 64))
-    assert simulation.state.truncated[0]
-    count, _ = imageio_ffmpeg.count_frames_and_secs(str(file))
-    assert count == 1 + 10 + round(END_S * 20)
-
-
 def test_a_coin_counts_ten_points_on_a_films_panel() -> None:
     game = Game(course(coins=[{"at": START}, {"at": COIN}], time_limit_s=0.1))
     game.play(0.05)
     assert panel_lines(game.simulation) == ["10 points   0.1 s", "1 of 2 coins"]
     game.play(0.05)
-    assert panel_lines(game.simulation)[2] == "time up: 50 %"
+    assert panel_lines(game.simulation)[2] == "time limit: 50 %"
 
 
 def test_the_panel_says_how_the_game_stands() -> None:

@@ -84,8 +84,8 @@ class Rails:
         np.maximum(slabs, self.table.movers.stop, out=slabs)
         games = self.games.concluding
         path = np.ascontiguousarray(path, dtype=np.float64)
-        step.conclude(games, self._every, self.step_s, path, self.physics, self.at, self._rewarding)
         self.bodies.position[:] = path[:, -1]
+        step.conclude(games, self._every, self.step_s, path, self.physics, self.at, self._rewarding)
         self.time_s += self.step_s
         found = self.games.step
         return Events(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from itertools import pairwise
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from roller_env.game.result import REWARD_TERMS
 from roller_env.game.rewards import RewardWeights, shaping
 from roller_env.level import Level
 from tests.builders import Game, coin, make_level, resting
@@ -62,7 +64,7 @@ def test_several_coins_in_one_step_are_all_paid() -> None:
     rails = Rails(make_level(coins=[coin(*resting(0.1 * i)) for i in range(3)]))
     assert rails.go(resting(0.1)).terms[0].tolist() == [3.0, 0.0, 0.0, 0.0]
     assert rails.go(resting()).terms[0].tolist() == [0.0, 0.0, 0.0, 0.0]
-    assert rails.state.earned[0].tolist() == [3.0, 0.0, 0.0, 0.0]
+    assert rails.state.reward_terms[0].tolist() == [3.0, 0.0, 0.0, 0.0]
 
 
 def test_the_finish_and_the_fall_are_paid_by_their_weights() -> None:
@@ -77,6 +79,18 @@ def test_the_finish_and_the_fall_are_paid_by_their_weights() -> None:
     events = Rails(make_level(), weights=weights).go((0, 0, -40.0))
     assert events.terms[0].tolist() == [0.0, 0.0, -3.0, 0.0]
     assert events.reward.tolist() == [-3.0]
+
+
+def test_the_terms_are_added_up_over_an_episode_and_kept_apart() -> None:
+    rails = Rails(make_level(coins=[coin(*resting(1.0)), coin(*resting(9.0))]), shaped=False)
+    total = sum(rails.go(resting(x)).reward[0] for x in (1.0, 5.0, 9.0))
+    rails.go((0, 0, -40.0))
+    assert rails.state.reward_terms[0].tolist() == [2.0, 0.0, -1.0, 0.0]
+    assert rails.state.total_reward[0] == total - 1.0
+
+
+def test_the_terms_are_those_that_have_weights() -> None:
+    assert tuple(field.name for field in fields(RewardWeights)) == REWARD_TERMS
 
 
 def test_standing_still_is_worth_no_points() -> None:

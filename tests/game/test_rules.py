@@ -114,6 +114,7 @@ def test_events_at_the_same_moment_have_the_order_of_their_kinds() -> None:
         "gate",
         "lift_pad",
         "camera_trigger",
+        "checkpoint",
         "finish",
     ]
 

@@ -7,8 +7,9 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.game.result import EpisodeResult
 from roller_env.level import Level
-from roller_env.play.session import GameSession, Phase, Result, play_config
+from roller_env.play.session import GameSession, Phase, play_config
 from roller_env.simulation import Simulation, Transition
 from tests.builders import coin, make_level
 
@@ -66,7 +67,7 @@ class Witness:
     def __init__(self) -> None:
         self.seeds: list[int] = []
         self.forces: list[list[Float64]] = []
-        self.results: list[Result] = []
+        self.results: list[EpisodeResult] = []
 
     def on_reset(self, simulation: Simulation, seed: int) -> None:
         assert simulation.state.steps[0] == 0
@@ -78,5 +79,5 @@ class Witness:
         self.forces[-1].append(force_n.copy())
         assert simulation.state.steps[0] == len(self.forces[-1])
 
-    def on_end(self, simulation: Simulation, result: Result) -> None:
+    def on_end(self, simulation: Simulation, result: EpisodeResult) -> None:
         self.results.append(result)

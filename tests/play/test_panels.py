@@ -7,34 +7,35 @@ from dataclasses import replace
 import pytest
 
 from roller_env.game.cameras import MODE_BEHIND, MODE_FIRST_PERSON
+from roller_env.game.result import EpisodeResult
 from roller_env.play.panels import end_rows, points_lines
-from roller_env.play.session import Result
 
-RESULT = Result(
+RESULT = EpisodeResult(
     success=True,
     fall=False,
     diverged=False,
     truncated=False,
     coins=15,
-    coins_in_level=24,
     score_percent=62.5,
     time_s=12.34,
+    total_reward=15.0,
 )
+COINS_IN_LEVEL = 24
 
 
 @pytest.mark.parametrize(("coins", "points"), [(0, "0"), (1, "10"), (15, "150"), (120, "1200")])
 def test_a_coin_is_worth_ten_points_on_the_points_panel(coins: int, points: str) -> None:
-    lines = points_lines(replace(RESULT, coins=coins), MODE_BEHIND)
+    lines = points_lines(replace(RESULT, coins=coins), COINS_IN_LEVEL, MODE_BEHIND)
     assert lines == [points, "points   12.3 s", f"{coins} of 24 coins"]
 
 
 def test_the_points_panel_names_a_camera_that_is_not_behind_the_ball() -> None:
-    assert points_lines(RESULT, MODE_FIRST_PERSON)[3:] == ["camera: first person"]
+    assert points_lines(RESULT, COINS_IN_LEVEL, MODE_FIRST_PERSON)[3:] == ["camera: first person"]
 
 
 def test_a_coin_is_worth_ten_points_on_the_end_panel_and_percent_are_percent() -> None:
     """`digits` with factor 10 for the points and for the level's coins, with 1 for the score."""
-    rows = dict(end_rows(RESULT))
+    rows = dict(end_rows(RESULT, COINS_IN_LEVEL))
     assert rows["Points"] == "150 of 240"
     assert rows["Coins"] == "15 of 24"
     assert rows["Score"] == "62 %"

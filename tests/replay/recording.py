@@ -40,7 +40,8 @@ def straight_on(level: Any, steps: int, direction: int = 1, **options: Any) -> R
     recorder.begin()
     for _ in range(steps):
         force = forces("directions", [direction])
-        recorder.record(force, simulation.step(force).reward)
+        simulation.step(force)
+        recorder.record(force)
     return recorder.replay()
 
 

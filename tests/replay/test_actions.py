@@ -13,11 +13,11 @@ from roller_env.game.actions import DIRECTIONS, KEY_FORCE_N, ActionMode, forces
 from roller_env.replay import ReplayError
 from roller_env.replay.actions import (
     ACTION_BYTES,
-    actions_of,
     checked_actions,
     decode_actions,
     encode_actions,
     encoding_of,
+    recorded_actions,
 )
 
 single = st.floats(-1.0, 1.0, width=32)
@@ -42,9 +42,9 @@ def kept(mode: ActionMode, actions: Any) -> Any:
 def test_directions_follow_from_forces(actions: list[int]) -> None:
     directions = np.array(actions, dtype=np.int64)
     pushed = forces("directions", directions)
-    assert actions_of("directions", pushed).tolist() == actions
+    assert recorded_actions("directions", pushed).tolist() == actions
     for mode in ("keys", "force"):
-        assert np.array_equal(forces(mode, actions_of(mode, pushed)), pushed)
+        assert np.array_equal(forces(mode, recorded_actions(mode, pushed)), pushed)
     assert kept("directions", directions).tolist() == actions
 
 
@@ -52,8 +52,8 @@ def test_directions_follow_from_forces(actions: list[int]) -> None:
 def test_forces_follow_from_forces(pushes: list[tuple[float, float]]) -> None:
     actions = np.array(pushes, dtype=np.float32).reshape(-1, 2)
     pushed = forces("force", actions)
-    assert actions_of("force", pushed).dtype == np.float32
-    assert np.array_equal(actions_of("force", pushed), actions)
+    assert recorded_actions("force", pushed).dtype == np.float32
+    assert np.array_equal(recorded_actions("force", pushed), actions)
     assert np.array_equal(kept("force", actions), actions)
 
 
@@ -62,7 +62,7 @@ def test_a_player_whose_pushes_are_finer_than_float32_is_kept_to_the_bit(
     pushes: list[tuple[float, float]],
 ) -> None:
     pushed = forces("force", np.array(pushes, dtype=np.float64).reshape(-1, 2))
-    actions = kept("force", actions_of("force", pushed))
+    actions = kept("force", recorded_actions("force", pushed))
     assert np.array_equal(forces("force", actions), pushed)
 
 
@@ -71,7 +71,7 @@ def test_keys_are_kept_as_they_were_held(held: list[list[int]]) -> None:
     keys = np.array(held, dtype=np.int8).reshape(-1, 4)
     assert kept("keys", keys).tolist() == held
     assert np.array_equal(
-        forces("keys", actions_of("keys", forces("keys", keys))), forces("keys", keys)
+        forces("keys", recorded_actions("keys", forces("keys", keys))), forces("keys", keys)
     )
 
 
@@ -83,7 +83,7 @@ def test_any_forces_are_refused_or_made_by_some_action(newtons: list[tuple[float
     pushed = np.array(newtons, dtype=np.float64).reshape(-1, 2)
     for mode in ("directions", "keys", "force"):
         try:
-            actions = actions_of(mode, pushed)
+            actions = recorded_actions(mode, pushed)
         except ReplayError:
             continue
         assert np.array_equal(forces(mode, actions), pushed)

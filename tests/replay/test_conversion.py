@@ -15,7 +15,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roller_env.config import make_config
 from roller_env.replay import Replay, ReplayError, load_replay, save_replay, verify
 from roller_env.replay.conversion import Format1, load_any, record_anew
 from roller_env.replay.file import encode
@@ -120,7 +119,7 @@ def test_a_game_that_ends_otherwise_here_is_not_passed_off_as_the_one_on_record(
     tmp_path: Path,
 ) -> None:
     played = wandered("flat", seed=3)
-    result = played.result.model_copy(update={"coins": played.result.coins + 1})
+    result = replace(played.result, coins=played.result.coins + 1)
     old = load_any(written(of_format_1(replace(played, result=result)), tmp_path))
     with pytest.raises(ReplayError, match=r"ended in .* 1 coins .* it ends in .* 0 coins"):
         record_anew(old)
@@ -130,9 +129,8 @@ def test_a_replay_is_recorded_anew_on_a_level_or_preset_that_was_changed(tmp_pat
     played = load_any(save_replay(straight_on("flat", 40, physics="fast"), tmp_path / "a.replay"))
     assert isinstance(played, Replay)
     assert same(record_anew(played), played)
-    options = played.options.keywords() | {"physics": "default"}
-    again = record_anew(played, make_config(level=played.level, **options))
-    assert again.options.physics.name == "default"
+    again = record_anew(played, replace(played.options, physics="default"))
+    assert again.options.preset.name == "default"
     assert np.array_equal(again.force_n, played.force_n)
     assert verify(again).is_exact
     # It went by another way to the same end.

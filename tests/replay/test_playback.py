@@ -13,6 +13,7 @@ from roller_env.game.version import RULES_VERSION
 from roller_env.physics.version import PHYSICS_VERSION
 from roller_env.replay import Playback, frames, verify
 from roller_env.replay.checksums import row_count
+from roller_env.replay.playback import paths
 from tests.replay.recording import pushed_otherwise, wandered
 from tests.simulation.driving import bits
 
@@ -151,8 +152,20 @@ def test_a_replay_of_other_rules_or_physics_says_so() -> None:
     assert f"recorded with rules 0, not {RULES_VERSION}" in str(verification)
 
 
+def test_paths_of_replays_played_together_are_those_of_each_played_alone() -> None:
+    played = [wandered("bridge", seed=seed) for seed in range(3)]
+    assert len({len(one) for one in played}) > 1
+    for one, path in zip(played, paths(played), strict=True):
+        alone = Playback(one)
+        assert path.shape == (len(one), 3)
+        for centre in path:
+            assert np.array_equal(centre, alone.simulation.ball_position[0])
+            alone.advance()
+    assert paths([]) == []
+
+
 def test_a_result_that_is_not_the_games_is_noticed() -> None:
-    richer = LONG.result.model_copy(update={"coins": LONG.result.coins + 1})
+    richer = replace(LONG.result, coins=LONG.result.coins + 1)
     verification = verify(replace(LONG, result=richer))
     assert verification.first_mismatch_step is None
     assert not verification.is_exact

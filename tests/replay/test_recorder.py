@@ -15,9 +15,9 @@ from roller_env.game.actions import ActionMode, forces
 from roller_env.game.step import INTRO_S
 from roller_env.level import shipped_levels
 from roller_env.pieces.coin import COIN
-from roller_env.replay import Recorder, ReplayError, replays_of, verify
+from roller_env.replay import Recorder, ReplayError, verify
 from tests.builders import make_level
-from tests.replay.recording import pushed_otherwise, same, straight_on, wandered
+from tests.replay.recording import pushed_otherwise, straight_on, wandered
 from tests.simulation.driving import simulation_of, wandering
 
 
@@ -46,14 +46,15 @@ def test_any_preset_and_any_action_are_on_record(physics: str, action: ActionMod
     actions = of_mode[action]
     for done in actions:
         force = forces(action, done[None])
-        recorder.record(force, simulation.step(force).reward)
+        simulation.step(force)
+        recorder.record(force)
     played = recorder.replay()
     if action != "keys":  # Opposite keys cancel, and are then as if neither was held.
         assert np.array_equal(played.actions, actions)
     assert np.array_equal(played.force_n, forces(action, actions))
     assert verify(played).is_exact
     assert played.result.outcome == "not ended"
-    assert played.options.physics.name == physics
+    assert played.options.preset.name == physics
 
 
 def test_every_row_and_every_episode_of_many_games_is_played_again_alone() -> None:
@@ -65,7 +66,8 @@ def test_every_row_and_every_episode_of_many_games_is_played_again_alone() -> No
     kept = []
     for _ in range(400):
         force = next(pushes)
-        recorder.record(force, simulation.step(force).reward)
+        simulation.step(force)
+        recorder.record(force)
         over = np.flatnonzero(simulation.state.over)
         kept += [recorder.replay(row) for row in np.intersect1d(over, rows)]
         simulation.reset(over)
@@ -84,7 +86,8 @@ def test_rows_held_back_are_not_on_record_for_that_step() -> None:
     for step in range(20):
         force = forces("directions", [1, 2])
         hold = np.array([step % 2 == 0, False])
-        recorder.record(force, simulation.step(force, hold=hold).reward)
+        simulation.step(force, hold=hold)
+        recorder.record(force)
     assert [len(recorder.replay(row)) for row in (0, 1)] == [10, 20]
     assert all(verify(recorder.replay(row)).is_exact for row in (0, 1))
 
@@ -106,7 +109,7 @@ def test_an_environment_is_recorded_from_outside() -> None:
     over, total = False, 0.0
     while not over:
         _, reward, terminated, truncated, info = environment.step(1)
-        recorder.record(forces("directions", [1]), np.array([reward]))
+        recorder.record(forces("directions", [1]))
         over, total = terminated or truncated, total + reward
     played = recorder.replay()
     assert verify(played).is_exact
@@ -125,45 +128,15 @@ def test_a_vector_environment_that_resets_in_the_next_step_is_recorded_from_outs
     over = np.zeros(3, dtype=bool)
     kept = []
     for _ in range(260):
-        _, reward, terminated, truncated, _ = environment.step(np.array([0, 1, 5]))
+        _, _, terminated, truncated, _ = environment.step(np.array([0, 1, 5]))
+        recorder.record(forces("directions", [0, 1, 5]))
         if over[1]:
             recorder.begin([1])
-        else:
-            recorder.record(forces("directions", [0, 1, 5]), reward)
         over = terminated | truncated
         if over[1]:
             kept.append(recorder.replay(1))
     assert len(kept) > 1
     assert all(verify(played).is_exact for played in kept)
-
-
-def test_games_of_which_starts_and_forces_were_kept_become_the_replays_they_would_have_been() -> (
-    None
-):
-    played = [wandered("bridge", seed=seed) for seed in range(4)]
-    again = replays_of(
-        played[0].config(),
-        np.array([one.start for one in played]),
-        [one.force_n for one in played],
-        player="at random",
-        seeds=[one.seed for one in played],
-    )
-    assert len({len(one) for one in played}) > 1
-    assert all(same(one, other) for one, other in zip(played, again, strict=True))
-
-
-def test_games_without_a_step_are_replays_without_one() -> None:
-    starts = np.array([wandered().start, wandered("flat", seed=1).start])
-    for steps in (0, 3):
-        pushes = [np.zeros((0, 2)), np.zeros((steps, 2))]
-        none, some = replays_of(wandered().config(), starts, pushes)
-        assert (len(none), len(some)) == (0, steps)
-        assert verify(none).is_exact
-        assert verify(some).is_exact
-
-
-def test_no_games_are_no_replays() -> None:
-    assert replays_of(wandered().config(), np.zeros((0, 3)), []) == []
 
 
 def test_a_game_whose_physics_fails_is_on_record_to_its_end() -> None:
@@ -184,8 +157,8 @@ def test_a_force_that_nobody_can_make_is_not_put_on_record() -> None:
         simulation = simulation_of("flat", physics="fast", action=action)
         recorder = Recorder(simulation)
         recorder.begin()
-        reward = simulation.step(np.zeros((1, 2))).reward
-        recorder.record(np.array([[newtons, 0.0]]), reward)
+        simulation.step(np.zeros((1, 2)))
+        recorder.record(np.array([[newtons, 0.0]]))
         with pytest.raises(ReplayError, match=f"step 0, .* is no action of mode '{action}'"):
             recorder.replay()
 
@@ -204,7 +177,8 @@ def test_a_game_that_was_reset_meanwhile_is_not_passed_off_as_the_one_on_record(
     recorder = Recorder(simulation)
     recorder.begin()
     force = forces("directions", [1])
-    recorder.record(force, simulation.step(force).reward)
+    simulation.step(force)
+    recorder.record(force)
     simulation.reset()
     with pytest.raises(ValueError, match="found it at step 0 after 1 recorded"):
         recorder.replay()
@@ -242,7 +216,8 @@ def test_a_step_that_the_recorder_was_not_told_of_is_noticed() -> None:
     recorder.begin()
     force = np.zeros((1, 2))
     simulation.step(force)
+    simulation.step(force)
     with pytest.raises(ValueError, match="found it at step 2 after 0 recorded"):
-        recorder.record(force, simulation.step(force).reward)
+        recorder.record(force)
     played = straight_on("flat", 5, physics="fast")
     assert len(played) == 5

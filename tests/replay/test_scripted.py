@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from roller_env.level import load_level, shipped_levels
 from roller_env.level.expand import expand
 from roller_env.replay import Versions, load_replay, record_episode, shipped_replays, verify
-from roller_env.replay.scripted import ScriptedPlayer, itinerary, meant, shortest_way
+from roller_env.replay.scripted import ScriptedPlayer, itinerary, relabelled, shortest_way
 from tests.builders import make_level
 from tests.replay.recording import wandered
 
@@ -80,27 +80,27 @@ def test_the_way_visits_every_point_between_its_ends_and_no_reversal_shortens_it
             assert length(way) <= length(way[:i] + way[i:j][::-1] + way[j:]) + 1e-6
 
 
-def test_a_player_that_slips_recovers() -> None:
+def test_a_player_recovers_from_action_noise() -> None:
     level = load_level("bridge")
     config = wandered("bridge").config()
     steady = record_episode(config, ScriptedPlayer(level), seed=1)
-    slipping = record_episode(config, ScriptedPlayer(level, slips=0.15, seed=1), seed=1)
+    noisy = record_episode(config, ScriptedPlayer(level, action_noise=0.15, seed=1), seed=1)
     assert steady.result.success
-    assert slipping.result.success
-    assert len(slipping) > len(steady)
+    assert noisy.result.success
+    assert len(noisy) > len(steady)
 
 
 @pytest.mark.parametrize("level", ["bridge", "gate"])
-def test_what_the_player_meant_is_what_it_did_but_for_its_slips(level: str) -> None:
+def test_relabelled_is_what_the_player_did_but_for_the_noise(level: str) -> None:
     config, loaded = wandered(level).config(), load_level(level)
     steady = record_episode(config, ScriptedPlayer(loaded), seed=1)
-    assert np.array_equal(meant(steady), steady.force_n)
-    slipping = record_episode(config, ScriptedPlayer(loaded, slips=0.3, seed=1), seed=1)
-    done_otherwise = (meant(slipping) != slipping.force_n).any(axis=1)
-    # One in nine slips holds the keys that were meant.
+    assert np.array_equal(relabelled(steady), steady.force_n)
+    noisy = record_episode(config, ScriptedPlayer(loaded, action_noise=0.3, seed=1), seed=1)
+    done_otherwise = (relabelled(noisy) != noisy.force_n).any(axis=1)
+    # One in nine of the noise's actions is what the player would have done.
     assert 0.1 < done_otherwise.mean() < 0.4
 
 
-def test_slips_are_a_share() -> None:
-    with pytest.raises(ValueError, match="a share from 0 to 1"):
-        ScriptedPlayer(load_level("flat"), slips=1.5)
+def test_action_noise_is_a_fraction() -> None:
+    with pytest.raises(ValueError, match="a fraction from 0 to 1"):
+        ScriptedPlayer(load_level("flat"), action_noise=1.5)

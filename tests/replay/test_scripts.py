@@ -54,10 +54,10 @@ def test_a_level_or_preset_that_only_has_the_name_of_one_is_told_of() -> None:
     assert about(played).count("\n") == 0
     nearer = played.level.model_copy(update={"title": "Another floor"})
     assert "note: its level is not the 'flat' of this version" in about(
-        replace(played, level=nearer)
+        replace(played, options=replace(played.options, level=nearer))
     )
-    weak = replace(played.options.physics, iterations=1)
-    options = played.options.model_copy(update={"physics": weak})
+    weak = replace(played.options.preset, iterations=1)
+    options = replace(played.options, physics=weak)
     assert "note: its physics is not a preset of this" in about(replace(played, options=options))
 
 

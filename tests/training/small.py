@@ -16,7 +16,7 @@ def small_config(**changes: Any) -> TrainingConfig:
         "environment": {"reward": "shaped", "physics": "fast", "max_episode_steps": 40},
         "seed": 3,
         "num_envs": 8,
-        "practice_share": 0.5,
+        "start_state_curriculum": 0.5,
         "total_steps": 8 * 16 * UPDATES,
         "checkpoint_interval_s": 0.0,
         "evaluation_episodes": 4,

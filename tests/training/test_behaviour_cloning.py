@@ -40,7 +40,7 @@ def directory(tmp_path_factory: pytest.TempPathFactory) -> Path:
     target = tmp_path_factory.mktemp("demonstrations")
     config = make_config(level="flat", physics="fast", num_threads=1)
     for seed in range(EPISODES):
-        player = ScriptedPlayer(load_level("flat"), slips=0.1, seed=seed)
+        player = ScriptedPlayer(load_level("flat"), action_noise=0.1, seed=seed)
         save_replay(record_episode(config, player, seed=seed), target / f"{seed}.replay")
     return target
 
@@ -119,7 +119,7 @@ def test_normalisation_is_that_of_the_demonstrations_and_outweighs_a_rollout(
 ) -> None:
     config = taught(directory)
     model, demonstrations = learner(config), load_demonstrations(str(directory), config)
-    clone(model, demonstrations, CloningConfig(epochs=1, held_out_share=0.01), seed=0)
+    clone(model, demonstrations, CloningConfig(epochs=1, held_out_fraction=0.01), seed=0)
     order = np.random.default_rng(0).permutation(EPISODES)
     learnt = [demonstrations[i] for i in order[1:]]
     seen = np.concatenate([one.observations for one in learnt])

@@ -31,9 +31,9 @@ from roller_env.training.checkpoint import (
     load_checkpoint,
     save_checkpoint,
 )
+from roller_env.training.curriculum import StartStateCurriculum
 from roller_env.training.files import RunError, RunFiles, only_one_process, write_atomically
 from roller_env.training.ppo import learn, make_environments, new_model
-from roller_env.training.practice import PracticeStarts
 from tests.training.small import UPDATES, small_config
 
 
@@ -60,7 +60,7 @@ def normaliser(model: PPO) -> VecNormalize:
 
 def games(model: PPO) -> Snapshot:
     environments = normaliser(model).venv
-    assert isinstance(environments, PracticeStarts)
+    assert isinstance(environments, StartStateCurriculum)
     return environments.environments.simulation.snapshot()
 
 
@@ -120,6 +120,31 @@ def test_random_generators_come_back_where_they_were(
     expected = draw()
     restored(load_checkpoint(file))
     assert draw() == expected
+
+
+OLD_NAMES = {"coin/taken": "coin_taken", "coin/collected": "points", "shaping/waypoint": "waypoint"}
+NEW_NAMES = ("total_reward", "reward_terms", "shaping/potential", "checkpoint/last")
+
+
+def test_a_checkpoint_of_a_version_before_is_gone_on_with(
+    trained: tuple[PPO, Checkpoint, Path], tmp_path: Path
+) -> None:
+    model, _, newer = trained
+    facts, arrays = unpacked(newer)
+    written = {}
+    for name, values in arrays.items():
+        parent, game, leaf = name.rpartition("/game/")
+        if not game or leaf not in NEW_NAMES:
+            written[f"{parent}{game}{OLD_NAMES.get(leaf, leaf)}"] = values
+    assert len(arrays) - len(written) == 8, "of the games under way and of those that are kept"
+    file = tmp_path / "checkpoint.zip"
+    file.write_bytes(packed(facts, written))
+    was, now = games(model), games(restored(load_checkpoint(file)))
+    assert np.array_equal(was.physics, now.physics)
+    for name, values in was.game.named().items():
+        if name not in NEW_NAMES:
+            assert np.array_equal(values, now.game.named()[name]), name
+    assert not now.game.reward_terms.any()
 
 
 def test_what_is_known_of_a_run_needs_no_environment(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from contextlib import suppress
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,9 +13,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from roller_env.config import make_config
+from roller_env.config import EnvConfig
 from roller_env.game.rewards import RewardWeights
-from roller_env.level import shipped_levels
+from roller_env.level import load_level, shipped_levels
+from roller_env.physics.presets import PhysicsPreset
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.config_source import ConfigError
 from tests.training.small import small_config
@@ -55,24 +57,26 @@ def test_an_override_reaches_a_field_inside_another(tmp_path: Path) -> None:
     overrides = ["ppo.gamma=0.5", "seed=7", "environment.reward=shaped"]
     config = load_config(file, overrides)
     assert (config.ppo.gamma, config.ppo.epochs, config.seed) == (0.5, 2, 7)
-    assert config.environment == {"reward": "shaped"}
+    assert config.environment == EnvConfig(level="flat", reward="shaped", discount=0.5)
 
 
 def test_the_environment_shapes_rewards_with_the_discount_of_the_learner() -> None:
-    options = small_config(ppo={"gamma": 0.97, "rollout_steps": 1024}).environment_options
-    assert options["discount"] == 0.97
+    ppo = {"gamma": 0.97, "rollout_steps": 1024}
+    assert small_config(ppo=ppo).environment.discount == 0.97
+    assert small_config(ppo=ppo).evaluation_environment.discount == 0.97
+    config = small_config(ppo=ppo, environment={"discount": 0.5})
+    assert config.environment.discount == 0.5
 
 
 def test_the_evaluation_may_be_held_elsewhere_than_the_training() -> None:
     config = small_config(evaluation_environment={"physics": "default"})
-    assert config.environment_options["physics"] == "fast"
-    assert config.evaluation_options == config.environment_options | {"physics": "default"}
+    assert config.environment.physics == "fast"
+    assert config.evaluation_environment == replace(config.environment, physics="default")
 
 
 def test_reward_weights_are_given_by_name() -> None:
     config = small_config(environment={"reward_weights": {"coin": 2.0}})
-    made = make_config(level=config.level, **config.environment_options)
-    assert made.reward_weights == RewardWeights(coin=2.0)
+    assert config.environment.reward_weights == RewardWeights(coin=2.0)
 
 
 @pytest.mark.parametrize(
@@ -201,6 +205,91 @@ def test_all_mistakes_are_told_at_once_each_with_its_place(tmp_path: Path) -> No
         ("ppo.epoch", 5, 3),
         ("speed", 6, 1),
     ]
+
+
+def test_all_mistakes_in_an_environments_options_are_told_each_with_its_place(
+    tmp_path: Path,
+) -> None:
+    text = """level: flat
+environment:
+  rewrad: shaped
+  action: keyz
+  reward_weights: {coin: much, fall: .inf, finis: 1}
+  physics: {name: mine, dt_s: 0, solver: PSG}
+  level: gate
+  width: 1
+evaluation_environment:
+  control_dt_s: 0.07
+  camera: 9
+"""
+    with pytest.raises(ConfigError) as caught:
+        load_config(written(tmp_path, text), ["environment.discount=2"])
+    told = {(problem.field, problem.line): problem.what for problem in caught.value.problems}
+    assert list(told) == [
+        ("environment.discount", None),
+        ("environment.rewrad", 3),
+        ("environment.action", 4),
+        ("environment.reward_weights", 5),
+        ("environment.reward_weights.coin", 5),
+        ("environment.reward_weights.fall", 5),
+        ("environment.physics.dt_s", 6),
+        ("environment.physics.solver", 6),
+        ("environment.level", 7),
+        ("environment.width", 8),
+        ("evaluation_environment.control_dt_s", 10),
+        ("evaluation_environment.camera", 11),
+    ]
+    assert "unknown field; known are 'action', " in told["environment.rewrad", 3]
+    assert "did you mean 'reward'?" in told["environment.rewrad", 3]
+    assert "did you mean 'finish'?" in told["environment.reward_weights", 5]
+    assert "did you mean 'keys'?" in told["environment.action", 4]
+
+
+def test_an_environment_is_given_as_options_as_a_configuration_or_as_what_was_written() -> None:
+    level = load_level("gate")
+    preset = PhysicsPreset("mine", dt_s=1 / 60)
+    env = EnvConfig(level="flat", physics=preset, reward_weights=RewardWeights(coin=3.0))
+    config = TrainingConfig(level="flat", environment=env)  # type: ignore[call-arg, unused-ignore]
+    assert config.environment == config.evaluation_environment == env
+    assert TrainingConfig.model_validate_json(config.model_dump_json()) == config
+    assert set(config.model_dump(mode="json")["environment"]) == {"physics", "reward_weights"}
+    elsewhere = config.on_level("gate")
+    assert elsewhere == TrainingConfig(level="gate", environment=env)
+    assert load_level(elsewhere.evaluation_environment.level) == level
+
+
+def test_names_of_before_are_taken_with_a_warning(tmp_path: Path) -> None:
+    text = "level: flat\npractice_share: 0.25\ncloning: {held_out_share: 0.5}\n"
+    with pytest.warns(DeprecationWarning, match="is called .* now") as warned:
+        config = load_config(written(tmp_path, text))
+    assert (config.start_state_curriculum, config.cloning.held_out_fraction) == (0.25, 0.5)
+    assert {str(one.message) for one in warned} == {
+        "practice_share is called start_state_curriculum now",
+        "held_out_share is called held_out_fraction now",
+    }
+    assert "share" not in config.to_yaml()
+    wrong = "level: flat\npractice_share: 2\ncloning:\n  held_out_share: 1\n"
+    with pytest.warns(DeprecationWarning, match="now"), pytest.raises(ConfigError) as caught:
+        load_config(written(tmp_path, wrong))
+    places = [(problem.field, problem.line) for problem in caught.value.problems]
+    assert places == [("practice_share", 2), ("cloning.held_out_share", 4)]
+
+
+def test_what_a_run_of_before_wrote_is_the_same_configuration(tmp_path: Path) -> None:
+    """Earlier versions wrote the options as they were given, defaults among them."""
+    text = """level: flat
+environment: {reward: shaped, physics: fast, action: directions, discount: 0.99}
+evaluation_environment: {physics: default, reward: shaped}
+"""
+    config = load_config(written(tmp_path, text))
+    assert config.model_dump(mode="json")["evaluation_environment"] == {"physics": "default"}
+    shorter = {"reward": "shaped", "physics": "fast"}
+    same = {
+        "level": "flat",
+        "environment": shorter,
+        "evaluation_environment": {"physics": "default"},
+    }
+    assert config.differences(TrainingConfig.model_validate(same)) == []
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from roller_env.game.rewards import RewardWeights
 from roller_env.level import load_level
 from roller_env.replay import record_episode, save_replay
 from roller_env.replay.datasets import to_minari
-from roller_env.replay.scripted import PLAYER, ScriptedPlayer, meant
+from roller_env.replay.scripted import PLAYER, ScriptedPlayer, relabelled
 from roller_env.simulation import Simulation
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.config_source import ConfigError
@@ -44,7 +44,7 @@ def test_an_episode_is_what_the_trainings_environment_gives(replays: Path) -> No
     config = training(reward="shaped", observation="rays")
     demonstrations = load_demonstrations(str(replays), config)
     assert [len(one) for one in demonstrations] == [len(wandered("flat", seed=i)) for i in range(3)]
-    environment = RollerEnv(level="flat", **config.environment_options)
+    environment = RollerEnv(**config.environment.keywords())
     for seed, demonstration in enumerate(demonstrations):
         seen, _ = environment.reset(seed=seed)
         assert isinstance(demonstration.observations, np.ndarray)
@@ -79,18 +79,18 @@ def test_keys_held_for_shorter_steps_than_the_trainings_are_thinned(tmp_path: Pa
     assert demonstration.rewards.sum() == played.result.total_reward
 
 
-def test_from_the_scripted_player_one_learns_what_it_meant_where_it_slipped(
+def test_from_the_scripted_player_one_learns_what_it_does_without_noise(
     tmp_path: Path,
 ) -> None:
     level, config = load_level("flat"), make_config(level="flat", physics="fast", num_threads=1)
     for seed in range(2):
-        player = ScriptedPlayer(level, slips=0.3, seed=seed)
+        player = ScriptedPlayer(level, action_noise=0.3, seed=seed)
         played = record_episode(config, player, seed=seed, player=PLAYER)
         save_replay(played, tmp_path / f"{seed}.replay")
         save_replay(replace(played, player="somebody"), tmp_path / "other" / f"{seed}.replay")
     by_player = load_demonstrations(str(tmp_path), training())[1]
     by_somebody = load_demonstrations(str(tmp_path / "other"), training())[1]
-    assert np.array_equal(forces("directions", by_player.actions), meant(played))
+    assert np.array_equal(forces("directions", by_player.actions), relabelled(played))
     assert np.array_equal(forces("directions", by_somebody.actions), played.force_n)
     assert not np.array_equal(by_player.actions, by_somebody.actions)
 

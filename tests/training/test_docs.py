@@ -52,7 +52,7 @@ def test_the_example_without_torch_acts_as_the_policy_does() -> None:
     said: dict[str, Any] = {}
     exec(IN_NUMPY, said)  # noqa: S102
     policy = load_policy("runs/ppo_flat-seed0")
-    environments = RollerVecEnv("flat", 8, seed=1, **policy.config.environment_options)
+    environments = RollerVecEnv(num_envs=8, seed=1, **policy.config.environment.keywords())
     seen = environments.reset()
     for _ in range(20):
         actions = policy(seen)

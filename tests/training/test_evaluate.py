@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from pathlib import Path
 from statistics import NormalDist
 from typing import Any
 
@@ -13,17 +13,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roller_env.envs.sb3 import RollerVecEnv
+from roller_env.envs.spaces import Observations
+from roller_env.envs.vector import RollerVectorEnv
+from roller_env.level import load_level
+from roller_env.replay import load_replay, verify
 from roller_env.training.evaluate import (
-    MAX_ROWS,
+    MAX_ENVS,
     Estimate,
+    envs_and_repeats,
     evaluate,
     mean_with_interval,
     proportion,
-    rows_and_repeats,
 )
 from roller_env.training.files import RunError
-from roller_env.training.normalisation import Observations
 
 Z95 = NormalDist().inv_cdf(0.975)
 FORWARD = 1
@@ -38,7 +40,7 @@ def all_but_the_first_row_wait(observations: Observations) -> npt.NDArray[Any]:
 @pytest.mark.parametrize("episodes", [0, -1, 10**9])
 def test_a_number_of_episodes_that_cannot_be_played_is_refused(episodes: int) -> None:
     with pytest.raises(RunError, match=f"episodes: found {episodes}; must be 1 to 1000000"):
-        rows_and_repeats(episodes)
+        envs_and_repeats(episodes)
 
 
 @given(st.integers(1, 10_000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
@@ -85,48 +87,82 @@ def test_no_episodes_give_no_number(nothing: Estimate) -> None:
 
 @given(st.integers(1, 20_000))
 def test_rows_play_at_least_what_was_asked_and_hardly_more(episodes: int) -> None:
-    rows, repeats = rows_and_repeats(episodes)
-    assert rows <= MAX_ROWS
+    rows, repeats = envs_and_repeats(episodes)
+    assert rows <= MAX_ENVS
     assert episodes <= rows * repeats < episodes + repeats
 
 
 def test_every_row_counts_equally_though_one_has_shorter_episodes() -> None:
-    environments = RollerVecEnv("flat", 3, physics="fast", max_episode_steps=120)
-    evaluation = evaluate(all_but_the_first_row_wait, environments, seed=0, episodes_per_row=2)
-    assert Counter(episode.row for episode in evaluation.episodes) == {0: 2, 1: 2, 2: 2}
-    assert {e.steps for e in evaluation.episodes if e.row > 0} == {120}
-    assert max(e.steps for e in evaluation.episodes if e.row == 0) < 120
+    envs = RollerVectorEnv(3, level="flat", physics="fast", max_episode_steps=120)
+    evaluation = evaluate(all_but_the_first_row_wait, envs, seed=0, episodes_per_env=2)
+    lengths = [len(replay) for replay in evaluation.replays]
+    assert len(lengths) == len(evaluation) == 6
+    assert lengths[2:] == [120] * 4
+    assert max(lengths[:2]) < 120
 
 
 def test_an_episode_is_told_as_it_went() -> None:
-    environments = RollerVecEnv("flat", 2, physics="fast", max_episode_steps=120)
-    evaluation = evaluate(all_but_the_first_row_wait, environments, seed=5)
-    runner, waiter = evaluation.episodes
+    envs = RollerVectorEnv(2, level="flat", physics="fast", max_episode_steps=120)
+    evaluation = evaluate(all_but_the_first_row_wait, envs, seed=5)
+    runner, waiter = evaluation.results
     assert (runner.outcome, waiter.outcome) == ("finish", "time limit")
     assert runner.coins > 0
     assert runner.score_percent == pytest.approx(100 * runner.coins / evaluation.coins_in_level)
     assert waiter.time_s == pytest.approx(120 / 20)
-    for episode in evaluation.episodes:
-        assert episode.path.shape == (episode.steps, 3)
-        assert episode.time_s == pytest.approx(episode.steps / 20)
-    assert np.ptp(waiter.path[:, 0]) < 0.01
-    assert np.all(np.diff(runner.path[:, 0]) >= 0)
+    for replay in evaluation.replays:
+        assert replay.result.time_s == pytest.approx(len(replay) / 20)
+        assert verify(replay).is_exact
 
 
 def test_the_same_seed_gives_the_same_evaluation() -> None:
-    paths = []
+    played = []
     for _ in range(2):
-        environments = RollerVecEnv("flat", 2, physics="fast", max_episode_steps=30)
-        evaluation = evaluate(all_but_the_first_row_wait, environments, seed=11)
-        paths.append([episode.path.tobytes() for episode in evaluation.episodes])
-    assert paths[0] == paths[1]
+        envs = RollerVectorEnv(2, level="flat", physics="fast", max_episode_steps=30)
+        evaluation = evaluate(all_but_the_first_row_wait, envs, seed=11)
+        played.append([replay.checksums.table.tobytes() for replay in evaluation.replays])
+    assert played[0] == played[1]
 
 
 def test_the_table_has_the_finish_time_of_the_finished_only() -> None:
-    environments = RollerVecEnv("flat", 4, physics="fast", max_episode_steps=120)
-    evaluation = evaluate(all_but_the_first_row_wait, environments, seed=0)
+    envs = RollerVectorEnv(4, level="flat", physics="fast", max_episode_steps=120)
+    evaluation = evaluate(all_but_the_first_row_wait, envs, seed=0)
     table = evaluation.table()
     assert table["success rate"] == proportion(1, 4)
     assert table["fall rate"] == proportion(0, 4)
-    assert table["time to the finish (s)"].mean == evaluation.episodes[0].time_s
-    assert table["time of an episode (s)"].mean > evaluation.episodes[0].time_s
+    assert table["time to the finish (s)"].mean == evaluation.results[0].time_s
+    assert table["time of an episode (s)"].mean > evaluation.results[0].time_s
+
+
+def each_row_another_way(observations: Observations) -> npt.NDArray[Any]:
+    return np.arange(len(observations)) % 9
+
+
+def test_every_episode_is_kept_as_it_was_evaluated(tmp_path: Path) -> None:
+    envs = RollerVectorEnv(6, level="flat", physics="fast", max_episode_steps=120)
+    evaluation = evaluate(
+        each_row_another_way, envs, seed=5, episodes_per_env=2, player="policy of a test"
+    )
+    files = evaluation.save_replays(tmp_path / "new")
+    assert [file.name for file in files] == [f"episode-{i:04d}.replay" for i in range(12)]
+    assert len({result.outcome for result in evaluation.results}) == 3
+    for number, (result, file) in enumerate(zip(evaluation.results, files, strict=True)):
+        replay = load_replay(file)
+        assert verify(replay).is_exact
+        assert replay.player == "policy of a test"
+        assert replay.result == result
+        assert (replay.actions == number // 2).all()
+
+
+def test_environments_that_do_not_leave_the_end_to_be_recorded_are_refused() -> None:
+    envs = RollerVectorEnv(2, level="flat", autoreset_mode="SAME_STEP")
+    with pytest.raises(ValueError, match=r"envs: found .*SAME_STEP; must be .*NEXT_STEP"):
+        evaluate(each_row_another_way, envs, seed=0)
+
+
+def test_episodes_that_no_replay_can_hold_are_refused_before_they_are_played() -> None:
+    level = load_level("flat").model_copy(update={"time_limit_s": 86_400.0})
+    envs = RollerVectorEnv(2, level=level)
+    with pytest.raises(RunError, match=r"1728000 control steps .*; set max_episode_steps"):
+        evaluate(each_row_another_way, envs, seed=0)
+    envs = RollerVectorEnv(2, level=level, max_episode_steps=4)
+    assert len(evaluate(each_row_another_way, envs, seed=0)) == 2

@@ -44,6 +44,15 @@ def test_a_row_that_a_dying_process_left_unfinished_is_dropped(tmp_path: Path) -
     assert [row["value"] for row in read_progress(file)] == ["1.0", "2.0"]
 
 
+def test_a_log_of_an_earlier_version_goes_on_with_the_columns_it_has(tmp_path: Path) -> None:
+    file = tmp_path / "progress.csv"
+    file.write_text(f"{STEPS}\n10\n")
+    writer = ContinuingCSV(file, 10)
+    log(writer, 20)
+    writer.close()
+    assert file.read_text() == f"{STEPS}\n10\n20\n"
+
+
 def test_a_training_that_starts_over_starts_its_log_over(tmp_path: Path) -> None:
     file = tmp_path / "progress.csv"
     file.write_text(f"{STEPS},value\n10,1.0\n")

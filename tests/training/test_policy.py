@@ -126,7 +126,7 @@ def without_safe_files(files: RunFiles) -> RunFiles:
 
 def observations(config: TrainingConfig) -> list[Any]:
     """Return what eight games show while they are pushed about at random."""
-    environments = RollerVecEnv(config.level, 8, seed=5, **config.environment_options)
+    environments = RollerVecEnv(num_envs=8, seed=5, **config.environment.keywords())
     environments.action_space.seed(5)
     seen: list[Any] = [environments.reset()]
     for _ in range(30):

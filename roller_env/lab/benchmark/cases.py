@@ -340,7 +340,7 @@ def with_subproc_vec_env(name: str, num_envs: int, **options: Any) -> Training:
 def as_make_train_does(name: str, config: TrainingConfig) -> Training:
     """Return the learner and environments of a training configuration, without its records."""
     environments = make_environments(config)
-    duration_s = make_config(**config.environment_options).control_dt_s
+    duration_s = config.environment.control_dt_s
     torch.set_num_threads(config.torch_threads)
     return Training(name, new_model(config, environments), duration_s)
 

@@ -1,9 +1,9 @@
-"""Practice: some episodes begin where the agent has been before, not at the level's start.
+"""A start-state curriculum: some episodes begin where the agent has been before.
 
 A long level teaches its end slowly when every attempt at it must first play the whole beginning. So
-the games an agent has brought to each waypoint of the route are kept, and a share of the episodes
-begins from one of them (Salimans & Chen 2018, Ecoffet et al. 2021 do the like). Only training does
-this: evaluation always plays from the start.
+the games an agent has brought to each waypoint of the route are kept, and a fraction of the
+episodes begins from one of them (Salimans & Chen 2018, Ecoffet et al. 2021 do the like). Only
+training does this: evaluation always plays from the start.
 """
 
 from __future__ import annotations
@@ -13,16 +13,14 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 from stable_baselines3.common.vec_env import VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
+from roller_env.arrays import Bool, Int64
 from roller_env.envs.sb3 import RollerVecEnv, VecSnapshot
 from roller_env.envs.spaces import shape_observation
 from roller_env.game.state import GameState
 from roller_env.simulation import Snapshot
-
-Int64 = npt.NDArray[np.int64]
 
 FROM_START: Final = "from_start"
 """Key of a finished episode's info: whether it began at the level's start."""
@@ -31,34 +29,34 @@ _KEPT: Final = 32
 """Games kept of each waypoint; a newer one takes the place of any."""
 
 _RENEWAL: Final = 0.1
-"""Share of the arrivals that are kept when a waypoint has all its games already."""
+"""Fraction of the arrivals that are kept when a waypoint has all its games already."""
 
 
 @dataclass(frozen=True, eq=False)
-class PracticeSnapshot:
-    """Everything that the future of a `PracticeStarts` depends on."""
+class CurriculumSnapshot:
+    """Everything that the future of a `StartStateCurriculum` depends on."""
 
     environments: VecSnapshot
     games: dict[int, list[Snapshot]]
     waypoint: Int64
-    from_start: npt.NDArray[np.bool_]
+    from_start: Bool
     generator: Mapping[str, Any]
 
 
-class PracticeStarts(VecEnvWrapper):
-    """Begins a share of the episodes at waypoints that were reached before, all as often."""
+class StartStateCurriculum(VecEnvWrapper):
+    """Begins a fraction of the episodes at waypoints that were reached before, all as often."""
 
-    def __init__(self, environments: RollerVecEnv, share: float, seed: int) -> None:
+    def __init__(self, environments: RollerVecEnv, fraction: float, seed: int) -> None:
         """Wrap environments.
 
         Args:
             environments: to wrap.
-            share: of the episodes that begin at a waypoint, 0 to 1.
+            fraction: of the episodes that begin at a waypoint, 0 to 1.
             seed: of the choice.
         """
         super().__init__(environments)
         self.environments = environments
-        self._share = share
+        self._fraction = fraction
         self._rng = np.random.default_rng(seed)
         self._games: dict[int, list[Snapshot]] = {}
         self._waypoint = np.zeros(self.num_envs, dtype=np.int64)
@@ -78,12 +76,12 @@ class PracticeStarts(VecEnvWrapper):
         for row in ended:
             infos[row][FROM_START] = bool(self._from_start[row])
         self._from_start[ended] = True
-        if self._share > 0.0:
+        if self._fraction > 0.0:
             self._keep(dones)
-            self._begin(ended[self._rng.random(len(ended)) < self._share], observations)
+            self._begin(ended[self._rng.random(len(ended)) < self._fraction], observations)
         return observations, rewards, dones, infos
 
-    def _keep(self, dones: npt.NDArray[np.bool_]) -> None:
+    def _keep(self, dones: Bool) -> None:
         """Keep the games that have just come to a waypoint."""
         simulation = self.environments.simulation
         waypoint = simulation.state.shaping.waypoint
@@ -116,9 +114,9 @@ class PracticeStarts(VecEnvWrapper):
         self._waypoint[rows] = simulation.state.shaping.waypoint[rows]
         self._from_start[rows] = False
 
-    def snapshot(self) -> PracticeSnapshot:
+    def snapshot(self) -> CurriculumSnapshot:
         """Return the state of all rows and what was kept; as copies."""
-        return PracticeSnapshot(
+        return CurriculumSnapshot(
             environments=self.environments.get_state(),
             games={waypoint: list(games) for waypoint, games in self._games.items()},
             waypoint=self._waypoint.copy(),
@@ -126,7 +124,7 @@ class PracticeStarts(VecEnvWrapper):
             generator=self._rng.bit_generator.state,
         )
 
-    def restore(self, snapshot: PracticeSnapshot) -> None:
+    def restore(self, snapshot: CurriculumSnapshot) -> None:
         """Put everything back; the same actions then give the same bits."""
         self.environments.set_state(snapshot.environments)
         self._games = {waypoint: list(games) for waypoint, games in snapshot.games.items()}

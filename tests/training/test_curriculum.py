@@ -1,4 +1,4 @@
-"""Practice begins episodes where the agent has been, and says so."""
+"""A start-state curriculum begins episodes where the agent has been, and says so."""
 
 from __future__ import annotations
 
@@ -11,18 +11,22 @@ import pytest
 
 from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.envs.spaces import shape_observation
-from roller_env.training.practice import FROM_START, PracticeStarts
+from roller_env.training.curriculum import FROM_START, StartStateCurriculum
 
 ROWS = 4
 FORWARD = np.full(ROWS, 1)
 
 
-def practice(share: float, **options: Any) -> PracticeStarts:
+def with_curriculum(fraction: float, **options: Any) -> StartStateCurriculum:
     fast = {"physics": "fast", "reward": "shaped", "max_episode_steps": 30}
-    return PracticeStarts(RollerVecEnv("flat", ROWS, seed=1, **fast | options), share, seed=2)
+    return StartStateCurriculum(
+        RollerVecEnv("flat", ROWS, seed=1, **fast | options), fraction, seed=2
+    )
 
 
-def played(environments: PracticeStarts, steps: int) -> tuple[list[bool], npt.NDArray[np.int64]]:
+def played(
+    environments: StartStateCurriculum, steps: int
+) -> tuple[list[bool], npt.NDArray[np.int64]]:
     """Roll forward; return where each ended episode had begun, and the steps its successor has."""
     from_start, steps_at_begin = [], []
     for _ in range(steps):
@@ -34,7 +38,7 @@ def played(environments: PracticeStarts, steps: int) -> tuple[list[bool], npt.ND
 
 
 def test_without_a_share_every_episode_begins_at_the_start() -> None:
-    environments = practice(0.0)
+    environments = with_curriculum(0.0)
     environments.reset()
     from_start, steps_at_begin = played(environments, 90)
     assert from_start == [True] * 3 * ROWS
@@ -42,7 +46,7 @@ def test_without_a_share_every_episode_begins_at_the_start() -> None:
 
 
 def test_with_all_of_the_share_only_the_first_episodes_begin_at_the_start() -> None:
-    environments = practice(1.0)
+    environments = with_curriculum(1.0)
     environments.reset()
     from_start, steps_at_begin = played(environments, 60)
     assert from_start[:ROWS] == [True] * ROWS
@@ -51,7 +55,7 @@ def test_with_all_of_the_share_only_the_first_episodes_begin_at_the_start() -> N
 
 
 def test_a_share_between_gives_both() -> None:
-    environments = practice(0.5)
+    environments = with_curriculum(0.5)
     environments.reset()
     from_start, _ = played(environments, 300)
     assert 0.25 < np.mean(from_start) < 0.75
@@ -59,7 +63,7 @@ def test_a_share_between_gives_both() -> None:
 
 @pytest.mark.parametrize("observation", ["state", "rays", "dict"])
 def test_what_is_shown_is_the_game_that_goes_on(observation: str) -> None:
-    environments = practice(1.0, observation=observation)
+    environments = with_curriculum(1.0, observation=observation)
     environments.reset()
     simulation = environments.environments.simulation
     begun = 0
@@ -75,15 +79,15 @@ def test_what_is_shown_is_the_game_that_goes_on(observation: str) -> None:
 
 
 def test_a_row_keeps_its_own_random_generator() -> None:
-    environments = practice(1.0)
+    environments = with_curriculum(1.0)
     environments.reset()
     played(environments, 60)
     generators = environments.environments.simulation.snapshot().generators
     assert len({str(generator) for generator in generators}) == ROWS
 
 
-def test_restored_practice_goes_on_bit_for_bit() -> None:
-    first, second = practice(0.5), practice(0.5)
+def test_a_restored_curriculum_goes_on_bit_for_bit() -> None:
+    first, second = with_curriculum(0.5), with_curriculum(0.5)
     first.reset()
     second.reset()
     played(first, 45)

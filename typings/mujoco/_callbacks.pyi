@@ -1,0 +1,6 @@
+"""MuJoCo's callbacks, as far as Roller uses them."""
+
+from collections.abc import Callable
+
+def get_mju_user_warning() -> Callable[[str], object] | None: ...
+def set_mju_user_warning(callback: Callable[[str], object] | None) -> None: ...

@@ -1,0 +1,3 @@
+"""MuJoCo's constants, as far as Roller uses them."""
+
+mjNGROUP: int
