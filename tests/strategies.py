@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from roller_env.level.schema import Ball, Level, Material, Route, Start
 from roller_env.pieces.box import Box
 from roller_env.pieces.camera_trigger import CameraTrigger
+from roller_env.pieces.checkpoint import Checkpoint
 from roller_env.pieces.coin import CoinArc, CoinGrid, CoinLine, Coins
 from roller_env.pieces.fields import METRES_PER_UNIT
 from roller_env.pieces.finish import Finish
@@ -27,6 +28,8 @@ from roller_env.pieces.tube import Opening, Tube
 from roller_env.pieces.wall import Wall
 
 SLOT_M = 6.0
+OVERHEAD_M = 20.0
+"""Over all that is solid."""
 LANE_HALF_WIDTH_M = 3.0
 CELL_M = 2.0
 
@@ -61,6 +64,17 @@ def balls() -> st.SearchStrategy[Ball]:
     )
 
 
+def _checkpoints(origin: Origin, length: float) -> st.SearchStrategy[Checkpoint]:
+    """Boxes across the lane, whose middles are over everything that is solid."""
+    return st.builds(
+        lambda x, width: Checkpoint(
+            at=_moved(origin, (x, 0.0, OVERHEAD_M)), size=(0.5, width, 2.0 * OVERHEAD_M)
+        ),
+        numbers(0.0, length),
+        numbers(0.5, 4.0),
+    )
+
+
 @st.composite
 def levels(draw: Draw) -> Level:
     """Valid levels with any number of every kind of piece."""
@@ -89,6 +103,8 @@ def levels(draw: Draw) -> Level:
         plates=plates,
         gates=gates,
         lift_pads=pads,
+        falls=draw(st.sampled_from(["end", "checkpoint"])),
+        checkpoints=tuple(draw(st.lists(_checkpoints(origin, slots * SLOT_M), max_size=2))),
         camera_triggers=tuple(draw(st.lists(_triggers(origin, slots * SLOT_M), max_size=3))),
         route=draw(st.none() | _routes(origin, slots)),
         **draw(_lane(slots, origin, surface, scenery)),

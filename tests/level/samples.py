@@ -23,6 +23,7 @@ description: Holds one of everything.
 units: quant
 gravity: 386
 kill_height: -1129
+falls: checkpoint
 time_limit_s: 90
 ball: {radius: 16, mass_kg: 1, friction: 0.3, elasticity: 0}
 start: {at: [0, 0, 16], jitter: [4, 4]}
@@ -72,6 +73,8 @@ gates:
   - {name: door, at: [450, 0, 32], size: [8, 128, 64], yaw_deg: 5, lowers_to: -32, speed: 32}
 lift_pads:
   - {at: [300, 300, 4], size: [32, 32, 8], force_n: 12.7, duration_s: 5, name: lift}
+checkpoints:
+  - {name: halfway, at: [0, 0, 16], size: [16, 128, 32]}
 camera_triggers:
   - {kind: overhead, at: [350, 0, 32], size: [8, 128, 64]}
   - {kind: retreat, at: [600, 0, 32], size: [8, 128, 64]}
