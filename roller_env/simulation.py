@@ -27,7 +27,10 @@ from roller_env.physics.presets import PhysicsPreset
 from roller_env.physics.stepper import Stepper
 from roller_env.pieces.coin import COIN
 from roller_env.pieces.fields import MAX_COORDINATE_M
+from roller_env.pieces.gate import GATE
 from roller_env.pieces.piece import Solid
+from roller_env.pieces.plate import PLATE
+from roller_env.pieces.rules import Rules
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,12 +241,16 @@ class Simulation:
     @property
     def plate_displacement(self) -> Float64:
         """(N, P) copy of how far the plates are over where the level puts them, metres, <= 0."""
-        return self._stepper.qpos[:, self.compiled.plate_qpos]
+        return self._displacement(PLATE)
 
     @property
     def gate_displacement(self) -> Float64:
         """(N, G) copy of how far the gates are over where the level puts them, metres."""
-        return self._stepper.qpos[:, self.compiled.gate_qpos]
+        return self._displacement(GATE)
+
+    def _displacement(self, rules: Rules[Any, Any]) -> Float64:
+        own = self.table.own(rules)
+        return self._bodies.displacement[:, own.mover : own.mover + own.movers].copy()
 
     @property
     def qpos(self) -> Float64:

@@ -34,8 +34,6 @@ class CompiledLevel:
         force_ctrl: (3,) indices in ``ctrl`` of the forces on the ball, newtons, world frame.
         plate_ctrl: (plates,) indices in ``ctrl`` of the plates' velocities, m/s, up positive.
         gate_ctrl: (gates,) likewise of the gates.
-        plate_act: (plates,) indices in ``act`` of the displacements that the plates' servos aim at.
-        gate_act: (gates,) likewise of the gates.
         ball_body: id of the ball's body, for rays that must not see it.
     """
 
@@ -49,8 +47,6 @@ class CompiledLevel:
     force_ctrl: Addresses
     plate_ctrl: Addresses
     gate_ctrl: Addresses
-    plate_act: Addresses
-    gate_act: Addresses
     ball_body: int
 
     def __deepcopy__(self, memo: dict[int, object]) -> CompiledLevel:
@@ -88,8 +84,6 @@ def compile_level(level: Level, physics: str | PhysicsPreset = "default") -> Com
         force_ctrl=_indices(model.actuator(name).id for name in FORCE_ACTUATORS),
         plate_ctrl=_indices(model.actuator(name).id for name in plates),
         gate_ctrl=_indices(model.actuator(name).id for name in gates),
-        plate_act=_indices(model.actuator(name).actadr[0] for name in plates),
-        gate_act=_indices(model.actuator(name).actadr[0] for name in gates),
         ball_body=int(model.body(BALL).id),
     )
 

@@ -18,6 +18,7 @@ from roller_env.level.schema import Level, Material
 from roller_env.physics.materials import contact_parameters
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.pieces.piece import Mover, Solid, path_of
+from roller_env.units import SCRIPT_RATE_HZ
 
 BALL: Final = "ball"
 FORCE_ACTUATORS: Final = ("force_x", "force_y", "lift")
@@ -46,9 +47,6 @@ MIDPHASE_GEOMS: Final = 150
 """Geoms up to which the ball is tested against every bounding box in turn. MuJoCo's tree of boxes
 (the midphase) finds the same contacts, to the bit; measured, it costs 0.3 to 0.5 us of a step of 6
 on 62 geoms and saves 2.4 of 9 on 600."""
-
-SCRIPT_RATE_HZ: Final = 60.0
-"""Nominal rate of the original's script loops."""
 
 
 def build_spec(level: Level, preset: PhysicsPreset) -> mujoco.MjSpec:

@@ -27,6 +27,7 @@ from roller_env.game.state import GameState
 from roller_env.game.tables import LevelTable, Movers, Regions, Routes
 from roller_env.pieces.rules import WORK, After, Before, CameraAsked, Noticed, Seen
 from roller_env.pieces.sweep import bounds, meets, time_of_fall, vector, visit
+from roller_env.units import frames
 
 kernel = compiled_with_packages("roller_env.pieces", makes_arrays=False)
 
@@ -36,9 +37,9 @@ SPLASH_S: Final = 1.0
 INTRO_S: Final = SPLASH_S + 5.0
 """Time from loading a level to control: the splash screen, then five seconds of the intro panel."""
 
-HANGING_S: Final = SPLASH_S + 10.0 / 60.0
-"""Time from loading a level to a physical ball: `roller` waits 10 frames, at the nominal 60 frames
-a second, which the splash holds up. Until then nothing moves and nothing happens."""
+HANGING_S: Final = SPLASH_S + frames(10.0)
+"""Time from loading a level to a physical ball: `roller` waits 10 frames, which the splash holds up.
+Until then nothing moves and nothing happens."""
 
 _COIN, _FINISH, _FALL, _PROGRESS = (REWARD_TERMS.index(name) for name in REWARD_TERMS)
 

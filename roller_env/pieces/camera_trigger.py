@@ -16,7 +16,7 @@ from roller_env.pieces.fields import Point, PositiveLength, Size
 from roller_env.pieces.look import ACTIVE, DONE, IDLE, Paint, Run, Shape, part
 from roller_env.pieces.piece import ExpandedLevel, Piece, Region, half_of
 from roller_env.pieces.rules import After, Noticed, Own, Rules, padded
-from roller_env.units import quants
+from roller_env.units import SCRIPT_RATE_HZ, frames, quants
 
 PANE_COLOUR: Final = "#0101c8"
 PANE_ALPHA: Final = 0.70
@@ -25,7 +25,7 @@ PANE_ALPHA: Final = 0.70
 BAND_SPACING_M: Final = quants(32.0)
 """Distance between the bands that run up a retreat trigger's pane."""
 
-BAND_SPEED_M_S: Final = quants(5.0 * 60.0)
+BAND_SPEED_M_S: Final = quants(5.0 * SCRIPT_RATE_HZ)
 """`camch2` scrolls its texture by 5 units a frame: read, as the tube's, as quants."""
 
 _PANE: Final = (Paint("trigger/", PANE_COLOUR, emission=0.4, opacity=PANE_ALPHA),)
@@ -108,8 +108,8 @@ class TriggerKind(IntEnum):
 _OVERHEAD: Final = int(TriggerKind.OVERHEAD)
 _FIRST_PERSON: Final = int(TriggerKind.FIRST_PERSON)
 
-OVERHEAD_DELAY_S: Final = 100.0 / 60.0
-"""`flipcam` waits 100 frames, at the nominal 60 frames a second."""
+OVERHEAD_DELAY_S: Final = frames(100.0)
+"""`flipcam` waits 100 frames."""
 
 OVERHEAD_WAITS: Final = 8
 """Entries of one game that can wait at once. `flipcam` runs once for every impact: each entry sets

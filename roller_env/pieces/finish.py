@@ -15,12 +15,12 @@ from roller_env.pieces.rules import Own, Rules, Seen, no_state, no_table, place_
 from roller_env.pieces.space import burying
 from roller_env.pieces.surfaces import box_surfaces
 from roller_env.problems import FieldPath, Problem
-from roller_env.units import quants
+from roller_env.units import frames, quants
 
 if TYPE_CHECKING:
     from roller_env.pieces.surroundings import Surroundings
 
-FRAME_S: Final = 1.0 / 60.0
+FRAME_S: Final = frames(1.0)
 SPARK_COLOUR: Final = "#01ff64"
 """`fire1`: red, green and blue of the particles that fly out of the finish, one every frame."""
 SPARK_SPEED_M_S: Final = quants(5.0 * 16.0)
