@@ -11,12 +11,10 @@ import pytest
 from roller_env.game.actions import KEY_FORCE_N
 from roller_env.lab.contact.course import (
     COURSE,
-    DRIVE,
     GAME_SCENES,
     GATE_PUSH,
     GameScene,
-    Pressed,
-    played_controls,
+    played_plan,
 )
 from roller_env.lab.contact.scene import ContactScene
 from roller_env.lab.methods import MUJOCO, MujocoMethod, without_warnings
@@ -39,17 +37,17 @@ def until(scene: GameSceneType, moment_s: float) -> GameSceneType:
 
 def test_the_keys_go_through_the_games_rules() -> None:
     """They push, and the plate that the ball is driven onto sinks."""
-    controls = played_controls("classic", DRIVE)
-    assert sum(one.seconds for one in controls) == pytest.approx(COURSE.horizon_s)
-    force = np.array([one.ctrl[:2] for one in controls])
+    plan = played_plan("classic", COURSE.keys)
+    assert sum(one.seconds for one in plan) == pytest.approx(COURSE.horizon_s)
+    force = np.array([one.ctrl[:2] for one in plan])
     np.testing.assert_allclose(np.unique(force), [-KEY_FORCE_N, 0.0, KEY_FORCE_N])
-    movers = np.array([one.ctrl[3:] for one in controls])
+    movers = np.array([one.ctrl[3:] for one in plan])
     assert not movers[0].any()
     assert (movers[-1] < 0.0).any()
 
 
 def test_before_any_impact_the_euler_family_is_ahead_by_h_over_t_and_rk4_is_exact() -> None:
-    drive = until(replace(COURSE, keys=(Pressed("w", 1.0),)), 1.0)
+    drive = until(replace(COURSE, keys=(("w", 1.0),)), 1.0)
     way = 0.5 * KEY_FORCE_N / 1.4
     for method in MUJOCO:
         error = drive.trial(method, 0.002).errors()["position"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -13,41 +13,35 @@ import mujoco
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from roller_env.lab.contact.scene import ContactScene, Float64, contact_of, game_contact, new_spec
-from roller_env.lab.contact.trial import Held, MujocoTrial, steps_of
+from roller_env.lab.contact.scene import (
+    CONVERGED,
+    UPWARDS,
+    ContactScene,
+    MujocoTrial,
+    add_ball,
+    add_ground,
+    contact_of,
+    game_contact,
+    new_spec,
+)
 from roller_env.lab.game import GRAVITY_M_S2, MASS_KG, RADIUS_M
 from roller_env.lab.methods import MUJOCO, MujocoMethod
 from roller_env.lab.scene import Measure
-from roller_env.lab.simulate import Path
+from roller_env.lab.simulate import Float64, Path
 from roller_env.physics.materials import IMPEDANCE, damping_ratio
 from roller_env.physics.presets import PhysicsPreset
 
 
-def add_falling_ball(spec: mujoco.MjSpec, name: str, x_m: float, **contact: Any) -> None:
-    """Add a ball that can only move up and down; its joint's 0 is where it touches the ground."""
-    body = spec.worldbody.add_body(name=name, pos=[x_m, 0.0, RADIUS_M])
-    body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0.0, 0.0, 1.0])
-    body.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        size=[RADIUS_M, 0.0, 0.0],
-        mass=MASS_KG,
-        condim=1,
-        contype=1,
-        conaffinity=0,
-        **contact,
-    )
-
-
-def add_ground(spec: mujoco.MjSpec) -> None:
-    """Add the ground z = 0, which leaves the contact's parameters to what falls on it."""
-    spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[0.0, 0.0, 1.0],
-        condim=1,
-        contype=0,
-        conaffinity=1,
-    )
+def falling_balls(
+    method: MujocoMethod, dt_s: float, contacts: Sequence[Mapping[str, Any]]
+) -> mujoco.MjSpec:
+    """Return balls over the ground that can only move up and down; ``qpos`` are their heights."""
+    spec = new_spec(method, dt_s, GRAVITY_M_S2, **CONVERGED)
+    add_ground(spec, condim=1, contype=0, conaffinity=1)
+    for number, contact in enumerate(contacts):
+        at = (2.0 * number, 0.0, RADIUS_M)
+        add_ball(spec, at, RADIUS_M, MASS_KG, UPWARDS, contype=1, conaffinity=0, **contact)
+    return spec
 
 
 @dataclass(frozen=True)
@@ -74,29 +68,30 @@ class Bounce(ContactScene):
 
     @property
     def solref(self) -> tuple[float, float]:
-        """Minus stiffness in 1/s^2 and minus damping in 1/s."""
+        """Minus stiffness in 1/s² and minus damping in 1/s."""
         ratio = damping_ratio(self.elasticity)
         return -(self.frequency_rad_s**2), -2.0 * ratio * self.frequency_rad_s
 
     def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
-        spec = new_spec(method, dt_s, GRAVITY_M_S2)
-        add_ground(spec)
-        add_falling_ball(spec, "ball", 0.0, **contact_of(0.0, self.solref))
-
         def lift(data: mujoco.MjData) -> None:
             data.qpos[0] = self.height_m
 
         def judge(path: Path) -> Mapping[str, float]:
-            height = path.qpos[-1, 0]
             soft = soft_bounce(self.height_m, self.solref, self.horizon_s)
             rigid = rigid_bounce(self.height_m, self.elasticity, self.horizon_s)
-            return {
-                "position": abs(height - soft) / self.height_m,
-                "rigid": abs(height - rigid) / self.height_m,
-            }
+            errors = np.abs(path.qpos[-1, 0] - np.array((soft, rigid))) / self.height_m
+            return dict(zip(("position", "rigid"), errors.tolist(), strict=True))
 
-        plan = [Held(np.empty(0), steps_of(self.horizon_s, dt_s))]
-        return MujocoTrial(spec.compile(), lift, plan, judge, self._names)
+        spec = falling_balls(method, dt_s, [contact_of(0.0, self.solref)])
+        return MujocoTrial(self, spec, judge, lift)
+
+
+def _event(
+    crossing: Callable[[float, Float64], float], direction: float
+) -> Callable[[float, Float64], float]:
+    """Return what ends an integration of SciPy's where it crosses 0 upwards or downwards."""
+    crossing.terminal, crossing.direction = True, direction  # type: ignore[attr-defined]
+    return crossing
 
 
 @cache
@@ -113,30 +108,22 @@ def soft_bounce(height_m: float, solref: tuple[float, float], time_s: float) -> 
     """
     stiffness, damping = -solref[0], -solref[1]
 
-    def fall(_t: float, y: Float64) -> list[float]:
-        return [y[1], -GRAVITY_M_S2]
-
-    def press(_t: float, y: Float64) -> list[float]:
-        return [y[1], -stiffness * y[0] - damping * y[1] - (1.0 - IMPEDANCE) * GRAVITY_M_S2]
-
-    def touch(_t: float, y: Float64) -> float:
-        return float(y[0])
-
     def push(_t: float, y: Float64) -> float:
         return float(-stiffness * y[0] - damping * y[1] + IMPEDANCE * GRAVITY_M_S2)
 
-    touch.terminal, touch.direction = True, -1.0  # type: ignore[attr-defined]
-    push.terminal, push.direction = True, -1.0  # type: ignore[attr-defined]
+    def fall(_t: float, y: Float64) -> list[float]:
+        return [y[1], -GRAVITY_M_S2]
 
-    def leave(_t: float, y: Float64) -> float:
-        return float(y[0])
+    def press(t: float, y: Float64) -> list[float]:
+        return [y[1], push(t, y) - GRAVITY_M_S2]
 
-    leave.terminal, leave.direction = True, 1.0  # type: ignore[attr-defined]
+    touch = _event(lambda _t, y: float(y[0]), -1.0)
+    let_go = [_event(push, -1.0), _event(lambda _t, y: float(y[0]), 1.0)]
     now, state, falling = 0.0, np.array([height_m, 0.0]), True
     while now < time_s:
         if not falling and abs(state[1]) < GRAVITY_M_S2 / damping:
             raise ValueError(f"time_s: found {time_s:g}; the ball is at rest after {now:g} s")
-        law, events = (fall, [touch]) if falling else (press, [push, leave])
+        law, events = (fall, [touch]) if falling else (press, let_go)
         part = solve_ivp(law, (now, time_s), state, "DOP853", rtol=1e-13, atol=1e-15, events=events)
         now, state, falling = float(part.t[-1]), part.y[:, -1], not falling
     return float(state[0])
@@ -145,15 +132,11 @@ def soft_bounce(height_m: float, solref: tuple[float, float], time_s: float) -> 
 def rigid_bounce(height_m: float, elasticity: float, time_s: float) -> float:
     """Return the height, metres, of a dropped rigid ball that bounces in no time."""
     speed = math.sqrt(2.0 * GRAVITY_M_S2 * height_m)
-    left = time_s - speed / GRAVITY_M_S2
-    if left < 0.0:
-        return height_m - 0.5 * GRAVITY_M_S2 * time_s**2
-    while True:
-        speed *= elasticity
-        flight = 2.0 * speed / GRAVITY_M_S2
-        if left < flight:
-            return speed * left - 0.5 * GRAVITY_M_S2 * left**2
-        left -= flight
+    # As if it had been thrown up from the ground.
+    left = time_s + speed / GRAVITY_M_S2
+    while left >= (flight := 2.0 * speed / GRAVITY_M_S2):
+        left, speed = left - flight, speed * elasticity
+    return speed * left - 0.5 * GRAVITY_M_S2 * left**2
 
 
 ELASTICITIES: Final = (0.0, 0.2, 0.5, 0.8, 0.95)
@@ -162,10 +145,9 @@ FAST_M_S: Final = 2.0
 """Impacts from here on are what a player takes for bounces: e = 0.8 throws the ball 0.13 m high."""
 
 ARRIVALS: Final = (0.2, 0.5, 0.8)
-"""Shares of a step after which a ball touches the ground, of which its bounce must not depend."""
+"""Fractions of a step after which a ball touches the ground, on which its bounce must not depend"""
 
 
-@dataclass(frozen=True)
 class Restitution(ContactScene):
     """Balls of every elasticity strike the ground at every speed, under gravity.
 
@@ -180,16 +162,7 @@ class Restitution(ContactScene):
     """
 
     def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
-        spec = new_spec(method, dt_s, GRAVITY_M_S2)
-        add_ground(spec)
-        # The product has no discrete preset; every integrator but RK4 is calibrated alike.
-        integrator = "implicitfast" if method.integrator == "discrete" else method.integrator
-        preset = PhysicsPreset("restitution", dt_s, integrator)
-        drops = list(product(ELASTICITIES, SPEEDS_M_S, ARRIVALS))
-        elasticity, speed, arrival = np.array(drops).T
-        for number, one in enumerate(elasticity):
-            contact = game_contact(0.0, float(one), preset)
-            add_falling_ball(spec, f"ball_{number}", 2.0 * number, **contact)
+        elasticity, speed, arrival = np.array([*product(ELASTICITIES, SPEEDS_M_S, ARRIVALS)]).T
         height = speed * dt_s * arrival
 
         def throw(data: mujoco.MjData) -> None:
@@ -199,22 +172,29 @@ class Restitution(ContactScene):
 
         def judge(path: Path) -> Mapping[str, float]:
             error = np.abs(returned_speed(path) / speed - elasticity)
-            worst = {
-                _restitution_name(one): float(error[elasticity == one].max())
-                for one in ELASTICITIES
+            chosen = {"worst": speed > 0.0, "fast": speed >= FAST_M_S} | {
+                f"e={one:g}": elasticity == one for one in ELASTICITIES
             }
-            fast = speed >= FAST_M_S
-            return {"worst": float(error.max()), "fast": float(error[fast].max())} | worst
+            return {name: float(error[those].max()) for name, those in chosen.items()}
 
-        plan = [Held(np.empty(0), steps_of(self.horizon_s, dt_s))]
-        return MujocoTrial(spec.compile(), throw, plan, judge, self._names)
+        contacts = [calibrated(one, method, dt_s) for one in elasticity]
+        return MujocoTrial(self, falling_balls(method, dt_s, contacts), judge, throw)
+
+
+def calibrated(elasticity: float, method: MujocoMethod, dt_s: float) -> dict[str, Any]:
+    """Return the product's contact without friction, calibrated for a method and its step.
+
+    The product has no discrete preset; every integrator but RK4 is calibrated alike.
+    """
+    integrator = "implicitfast" if method.integrator == "discrete" else method.integrator
+    return game_contact(0.0, float(elasticity), PhysicsPreset("calibrated", dt_s, integrator))
 
 
 def returned_speed(path: Path) -> Float64:
     """Return the speeds, (balls,) m/s, at which balls leave the ground after their first impact.
 
     From the first sample in which a ball is off the ground again and rising, less what gravity has
-    taken since it left: sqrt(v^2 + 2 g z). 0 for a ball that stays.
+    taken since it left: sqrt(v² + 2 g z). 0 for a ball that stays.
     """
     height, velocity = path.qpos, path.qvel
     touched = np.logical_or.accumulate(height < 0.0, axis=0)
@@ -223,10 +203,6 @@ def returned_speed(path: Path) -> Float64:
     energy = velocity[first] ** 2 + 2.0 * GRAVITY_M_S2 * height[first]
     speed: Float64 = np.where(back.any(axis=0), np.sqrt(energy), 0.0)
     return speed
-
-
-def _restitution_name(elasticity: float) -> str:
-    return f"e={elasticity:g}"
 
 
 BOUNCE: Final = Bounce(
@@ -241,19 +217,16 @@ BOUNCE: Final = Bounce(
     time_steps_s=(0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4),
     failure=0.5,
 )
+_COEFFICIENT: Final = "largest error of the coefficient of restitution"
 RESTITUTION: Final = Restitution(
     name="restitution",
     title="Balls of every elasticity strike the ground at 0.2 to 20 m/s",
     horizon_s=0.2,
     measures=(
-        Measure("worst", "largest error of the coefficient of restitution", "model"),
+        Measure("worst", _COEFFICIENT, "model"),
         Measure("fast", "the same at 2 m/s and more", "model"),
         *(
-            Measure(
-                _restitution_name(one),
-                f"largest error of the coefficient of restitution of elasticity {one:g}",
-                "model",
-            )
+            Measure(f"e={one:g}", f"{_COEFFICIENT} of elasticity {one:g}", "model")
             for one in ELASTICITIES
         ),
     ),

@@ -14,8 +14,8 @@ Three things about them that are not on its pages:
   positions are first computed, so all 216 balls are at the origin: 23,220 pairs of squared
   penetration 0.04 m² and 216 of 0.01 m² with the ground are 930.96 m², which the time mean turns
   into 93.1 m²/s times the step. Its balls also have friction 0.8 and drop from 1.31 m, where the
-  other engines' are smooth and start on the ground. `dropped` repeats that; with the empty sample
-  put back in, MuJoCo 4 gives the published figures within 0.2 % at 10 ms and 3 % at 100 ms.
+  other engines' are smooth and start on the ground. `DROPPED_PILE` repeats that; with the empty
+  sample put back in, MuJoCo 4 gives the published figures within 0.2 % at 10 ms and 3 % at 100 ms.
 
 SimBenchmark's solvers for MuJoCo were PGS, CG and Newton, all with sparse matrices. Here it is CG,
 as its sparse path is right in MuJoCo 4.0.0 (Newton's Hessian is not), and dense matrices of 156
@@ -30,7 +30,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
+from pathlib import Path as File
 from typing import Any, Final
 
 import mujoco
@@ -38,17 +39,23 @@ import numpy as np
 from pandas import read_csv
 from scipy.spatial.distance import pdist
 
-from roller_env.lab import simulate
-from roller_env.lab.contact.scene import ContactScene, Float64, game_contact
-from roller_env.lab.contact.trial import Held, MujocoTrial, steps_of
+from roller_env.lab.contact.impact import calibrated
+from roller_env.lab.contact.scene import (
+    ContactScene,
+    Held,
+    MujocoTrial,
+    add_ball,
+    add_ground,
+    new_spec,
+)
 from roller_env.lab.methods import MUJOCO, PYRAMIDAL, MujocoMethod
 from roller_env.lab.scene import Measure
-from roller_env.physics.presets import PhysicsPreset
+from roller_env.lab.simulate import Float64, Path
 
 GRAVITY_M_S2: Final = 9.81
 """SimBenchmark's, unlike the game's."""
 
-PUBLISHED: Final = read_csv(Path(__file__).with_suffix(".csv"))
+PUBLISHED: Final = read_csv(File(__file__).with_suffix(".csv"))
 """SimBenchmark's data without error reduction: ``test`` (the scene here that it belongs beside),
 ``engine`` (with solver and integrator where there was a choice), ``dt_s``, ``error`` (its measure;
 infinite where the simulation blew up) and ``wall_s`` (CPU seconds of its machine of 2018).
@@ -57,31 +64,12 @@ From ``data/rolling/default.csv``, ``data/bouncing/sample.csv``, ``data/666/samp
 """
 
 
-def benchmark_spec(method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
-    """Return an empty world with SimBenchmark's gravity, MuJoCo's defaults and the sparse CG."""
-    spec = mujoco.MjSpec()
-    method.configure(spec, dt_s)
-    spec.option.gravity = [0.0, 0.0, -GRAVITY_M_S2]
-    spec.option.solver = mujoco.mjtSolver.mjSOL_CG
-    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
+def benchmark_spec(method: MujocoMethod, dt_s: float, friction: float) -> mujoco.MjSpec:
+    """Return a ground with SimBenchmark's gravity, MuJoCo's defaults and the sparse CG."""
+    solver, jacobian = mujoco.mjtSolver.mjSOL_CG, mujoco.mjtJacobian.mjJAC_SPARSE
+    spec = new_spec(method, dt_s, GRAVITY_M_S2, solver=solver, jacobian=jacobian)
+    add_ground(spec, **rubbing(friction))
     return spec
-
-
-def add_sphere(
-    spec: mujoco.MjSpec, position: Sequence[float], radius_m: float, mass_kg: float, **contact: Any
-) -> None:
-    """Add a free sphere; ``contact`` are attributes of its geom."""
-    body = spec.worldbody.add_body(pos=list(position))
-    body.add_freejoint()
-    size = [radius_m, 0.0, 0.0]
-    body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, mass=mass_kg, **contact)
-
-
-def add_plane(spec: mujoco.MjSpec, friction: float) -> None:
-    """Add the ground z = 0."""
-    spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], **rubbing(friction)
-    )
 
 
 def rubbing(friction: float) -> dict[str, Any]:
@@ -97,7 +85,7 @@ class Rolling(ContactScene):
         direction: (x, y) unit vector of the push.
     """
 
-    direction: tuple[float, float] = (0.0, 1.0)
+    direction: tuple[float, float]
 
     force_n = 150.0
     box_kg = 10.0
@@ -118,8 +106,7 @@ class Rolling(ContactScene):
         return (self.force_n - f1 - self.balls * f2) / self.box_kg, f2 / self.ball_kg
 
     def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
-        spec = benchmark_spec(method, dt_s)
-        add_plane(spec, self.ground_friction)
+        spec = benchmark_spec(method, dt_s, self.ground_friction)
         half_edge, half_height, overlap = 10.0, 0.5, 2e-6
         box = spec.worldbody.add_body(pos=[0.0, 0.0, half_height - overlap])
         box.add_freejoint()
@@ -132,17 +119,16 @@ class Rolling(ContactScene):
         for x in np.arange(-4.0, 5.0, 2.0):
             for y in np.arange(-4.0, 5.0, 2.0):
                 at = (x, y, 3.0 * half_height - overlap)
-                add_sphere(spec, at, half_height, self.ball_kg, **rubbing(self.ball_friction))
+                add_ball(spec, at, half_height, self.ball_kg, **rubbing(self.ball_friction))
 
         def push(data: mujoco.MjData) -> None:
             data.xfrc_applied[1, :2] = self.force_n * np.array(self.direction)
 
-        def judge(path: simulate.Path) -> Mapping[str, float]:
+        def judge(path: Path) -> Mapping[str, float]:
             return {"velocity": self.error(path.time, path.qvel[:, :3], path.qvel[:, 6:9])}
 
-        total, part = steps_of(self.horizon_s, dt_s), steps_of(0.2, dt_s)
-        plan = [Held(np.empty(0), part), Held(np.empty(0), total - part)]
-        return MujocoTrial(spec.compile(), push, plan, judge, self._names, slice(0, 1))
+        plan = Held(0.2), Held(self.horizon_s - 0.2)
+        return MujocoTrial(self, spec, judge, push, plan, slice(0, 1))
 
     def error(self, time: Float64, box: Float64, ball: Float64) -> float:
         """Return SimBenchmark's error: the mean over time of both squared velocity errors.
@@ -163,7 +149,6 @@ class Rolling(ContactScene):
         return squares
 
 
-@dataclass(frozen=True)
 class Bouncing(ContactScene):
     """49 smooth balls of 10 kg drop 5 m and should bounce for ever; their energy is watched.
 
@@ -177,30 +162,21 @@ class Bouncing(ContactScene):
     radius_m = 0.1
     ball_kg = 10.0
     side = 7
-
-    @property
-    def energy_j(self) -> float:
-        """Of all balls at the start, above the ground."""
-        return self.side**2 * self.ball_kg * GRAVITY_M_S2 * self.height_m
+    energy_j = side**2 * ball_kg * GRAVITY_M_S2 * height_m
+    """Of all balls at the start, above the ground."""
 
     def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
-        spec = benchmark_spec(method, dt_s)
-        add_plane(spec, 0.0)
-        integrator = "implicitfast" if method.integrator == "discrete" else method.integrator
-        contact = game_contact(0.0, 1.0, PhysicsPreset("bouncing", dt_s, integrator))
-        for x in range(self.side):
-            for y in range(self.side):
-                at = (2.0 * x, 2.0 * y, self.height_m)
-                add_sphere(spec, at, self.radius_m, self.ball_kg, condim=1, **contact)
+        spec = benchmark_spec(method, dt_s, 0.0)
+        contact = calibrated(1.0, method, dt_s)
+        for x, y in np.ndindex(self.side, self.side):
+            at = (2.0 * x, 2.0 * y, self.height_m)
+            add_ball(spec, at, self.radius_m, self.ball_kg, **contact)
 
-        def judge(path: simulate.Path) -> Mapping[str, float]:
+        def judge(path: Path) -> Mapping[str, float]:
             return {"energy": self.error(path.qpos[:, 2::7], path.qvel.reshape(-1, 49, 6))}
 
-        total, part = steps_of(self.horizon_s, dt_s), steps_of(2.0, dt_s)
-        plan = [Held(np.empty(0), part), Held(np.empty(0), total - part)]
-        return MujocoTrial(
-            spec.compile(), lambda _data: None, plan, judge, self._names, slice(0, 1)
-        )
+        plan = Held(2.0), Held(self.horizon_s - 2.0)
+        return MujocoTrial(self, spec, judge, plan=plan, part=slice(0, 1))
 
     def error(self, height: Float64, velocity: Float64) -> float:
         """Return SimBenchmark's error: the mean over time of the squared error of the energy.
@@ -244,32 +220,26 @@ class SixSixSix(ContactScene):
         return squared_penetration(np.zeros((self.side**3, 3)), self.radius_m)
 
     def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
-        spec = benchmark_spec(method, dt_s)
+        spec = benchmark_spec(method, dt_s, self.friction)
         # Deep piles have many contacts at large steps.
         spec.memory = 2**28
-        add_plane(spec, self.friction)
         random = np.random.default_rng(self.seed)
         lowest = np.array([0.0, 0.0, self.lowest_m])
         # SimBenchmark's file for MuJoCo widens the impedance's range; see its sphere XML.
         contact = rubbing(self.friction) | {"solimp": [0.9, 0.9, 0.01, 0.5, 2.0]}
         for place in np.ndindex(self.side, self.side, self.side):
             at = self.gap_m * np.array(place) + self.disturbance_m * random.random(3) + lowest
-            add_sphere(spec, at.tolist(), self.radius_m, self.ball_kg, **contact)
-        total = steps_of(self.horizon_s, dt_s)
+            add_ball(spec, at, self.radius_m, self.ball_kg, **contact)
 
-        def judge(path: simulate.Path) -> Mapping[str, float]:
-            places = path.qpos.reshape(total + 1, -1, 7)[:-1, :, :3]
+        def judge(path: Path) -> Mapping[str, float]:
+            places = path.qpos.reshape(len(path.qpos), -1, 7)[:-1, :, :3]
             squares = np.array([squared_penetration(one, self.radius_m) for one in places])
-            mean = float(squares.mean())
-            as_published = mean + (self.empty_sample_m2 - squares[0]) / total
-            return {"penetration": mean, "as_published": float(as_published)}
+            published = np.array([self.empty_sample_m2, *squares[1:]])
+            return {"penetration": float(squares.mean()), "as_published": float(published.mean())}
 
         # Timed from 1 s to 1.5 s, while the pile falls apart.
-        before, part = steps_of(1.0, dt_s), steps_of(0.5, dt_s)
-        plan = [Held(np.empty(0), steps) for steps in (before, part, total - before - part)]
-        return MujocoTrial(
-            spec.compile(), lambda _data: None, plan, judge, self._names, slice(1, 2)
-        )
+        plan = Held(1.0), Held(0.5), Held(self.horizon_s - 1.5)
+        return MujocoTrial(self, spec, judge, plan=plan, part=slice(1, 2))
 
 
 def squared_penetration(centres: Float64, radius_m: float) -> float:
@@ -284,32 +254,34 @@ def squared_penetration(centres: Float64, radius_m: float) -> float:
     return float((balls**2).sum() + (ground**2).sum())
 
 
-_ROLLING_STEPS_S: Final = (0.02, 0.01, 0.005, 0.002, 0.001)
-_ROLLING_MEASURES: Final = (
-    Measure("velocity", "mean squared velocity error over 4 s, (m/s)²", "model"),
+_rolling = partial(
+    Rolling,
+    horizon_s=4.0,
+    measures=(Measure("velocity", "mean squared velocity error over 4 s, (m/s)²", "model"),),
+    methods=(*MUJOCO, *PYRAMIDAL),
+    time_steps_s=(0.02, 0.01, 0.005, 0.002, 0.001),
+    # A third of that of a box which does not move, 3.14.
+    failure=1.0,
 )
-_PILE_MEASURES: Final = (
-    Measure("penetration", "mean squared penetration over 10 s, m²", "model"),
-    Measure("as_published", "the same with SimBenchmark's empty first sample, m²", "model"),
+_pile = partial(
+    SixSixSix,
+    horizon_s=10.0,
+    measures=(
+        Measure("penetration", "mean squared penetration over 10 s, m²", "model"),
+        Measure("as_published", "the same with SimBenchmark's empty first sample, m²", "model"),
+    ),
+    # About that of 216 balls which overlap every neighbour by a fifth of their diameter.
+    failure=1.0,
 )
 
-
-def _rolling(name: str, said: str, direction: tuple[float, float]) -> Rolling:
-    return Rolling(
-        name=name,
-        title=f"SimBenchmark rolling: a box under 25 balls is pushed, {said}",
-        horizon_s=4.0,
-        measures=_ROLLING_MEASURES,
-        methods=(*MUJOCO, *PYRAMIDAL),
-        time_steps_s=_ROLLING_STEPS_S,
-        # A third of that of a box which does not move, 3.14.
-        failure=1.0,
-        direction=direction,
-    )
-
-
-ROLLING_Y: Final = _rolling("rolling-y", "along y", (0.0, 1.0))
-ROLLING_XY: Final = _rolling("rolling-xy", "60° from x", (0.5, math.sqrt(0.75)))
+ROLLING_Y: Final = _rolling(
+    "rolling-y", "SimBenchmark rolling: a box under 25 balls is pushed, along y", direction=(0.0, 1)
+)
+ROLLING_XY: Final = _rolling(
+    "rolling-xy",
+    "SimBenchmark rolling: a box under 25 balls is pushed, 60° from x",
+    direction=(0.5, math.sqrt(0.75)),
+)
 BOUNCING: Final = Bouncing(
     name="bouncing",
     title="SimBenchmark bouncing: 49 balls drop 5 m, elasticity 1",
@@ -318,26 +290,19 @@ BOUNCING: Final = Bouncing(
     methods=MUJOCO,
     time_steps_s=(0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001),
     # That of balls which lose half their energy.
-    failure=(0.5 * 49 * 10.0 * GRAVITY_M_S2 * 5.0) ** 2,
+    failure=(Bouncing.energy_j / 2.0) ** 2,
 )
-PILE: Final = SixSixSix(
-    name="666",
-    title="SimBenchmark 666: 216 smooth balls collapse",
-    horizon_s=10.0,
-    measures=_PILE_MEASURES,
+PILE: Final = _pile(
+    "666",
+    "SimBenchmark 666: 216 smooth balls collapse",
     methods=MUJOCO,
     time_steps_s=(0.1, 0.05, 0.02, 0.01, 0.005),
-    # About that of 216 balls which overlap every neighbour by a fifth of their diameter.
-    failure=1.0,
 )
-DROPPED_PILE: Final = SixSixSix(
-    name="666-dropped",
-    title="SimBenchmark 666 as its MuJoCo file has it: dropped from 1.2 m, friction 0.8",
-    horizon_s=10.0,
-    measures=_PILE_MEASURES,
+DROPPED_PILE: Final = _pile(
+    "666-dropped",
+    "SimBenchmark 666 as its MuJoCo file has it: dropped from 1.2 m, friction 0.8",
     methods=(MujocoMethod("Euler"), MujocoMethod("RK4")),
     time_steps_s=(0.1, 0.02, 0.01),
-    failure=1.0,
     lowest_m=1.311,
     friction=0.8,
 )
