@@ -1,0 +1,439 @@
+"""Limits of contacts: impacts, walls, friction, resting, seams, and why a skidding ball hops."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache, partial
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+
+from roller_env.compile.compiled import compile_level
+from roller_env.compile.mjcf import build_spec
+from roller_env.lab import game
+from roller_env.lab.contact.scene import UPWARDS, add_ball, contact_of, new_spec
+from roller_env.lab.methods import MujocoMethod
+from roller_env.lab.simulate import Start, record, settled, started, stays
+from roller_env.lab.stability.limits import Case, Effort
+from roller_env.lab.stability.smooth import (
+    DISCRETE,
+    EULER,
+    IMPLICITFAST,
+    RK4,
+    explicit_damping_limit,
+    rk4_servo_limit,
+)
+from roller_env.physics.materials import DAMPING_STEPS
+from roller_env.physics.presets import PRESETS, PhysicsPreset
+
+GRAVITY: Final = 9.81
+RADIUS_M: Final = 0.2
+WALL_M: Final = 0.1
+"""Thickness of the wall that the ball is shot at."""
+
+TAU_S: Final = 0.02
+"""MuJoCo's default time constant of a contact."""
+IMPEDANCE: Final = 0.95
+"""MuJoCo's default lets it rise from 0.9 to 0.95 within the first millimetre of depth."""
+COARSE_S: Final = 0.002
+"""MuJoCo's default time step."""
+FINE_S: Final = TAU_S / 400
+"""A step that resolves a contact; what remains of the discretisation is about h / tau."""
+SETTLE_S: Final = 0.5
+"""After which what was put down no longer sinks."""
+REST_M: Final = (1.0 - IMPEDANCE) * GRAVITY * TAU_S**2
+"""Depth at which a ball rests in the floor."""
+
+
+def add_box(
+    spec: mujoco.MjSpec, at: Sequence[float], half_size: Sequence[float], **contact: Any
+) -> None:
+    """Add a fixed box."""
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, pos=at, size=half_size, **contact)
+
+
+@lru_cache(maxsize=64)
+def ball_on_box(
+    method: MujocoMethod,
+    dt_s: float,
+    *,
+    solref: tuple[float, float] = (TAU_S, 1.0),
+    impedance: float = IMPEDANCE,
+    friction: float = 0.0,
+    gravity: float = 0.0,
+    thickness: float = 2.0,
+    speculative: bool = False,
+    refsafe: bool = True,
+    impratio: float = 1.0,
+) -> mujoco.MjModel:
+    """Return a wide box whose upper face is at z = 0, and on it a ball that cannot turn.
+
+    ``qpos`` is the way of the ball, of 1 kg and `RADIUS_M`, from where it touches the face. The
+    parameters of the contact are the same on both geoms, so that nothing is mixed.
+    """
+    spec = new_spec(method, dt_s, gravity, impratio=impratio)
+    if speculative:
+        spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SPECULATIVE
+    if not refsafe:
+        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_REFSAFE
+    contact = contact_of(friction, solref, impedance)
+    add_ball(spec, (0.0, 0.0, RADIUS_M), RADIUS_M, slides=np.eye(3).tolist(), **contact)
+    add_box(spec, (0.0, 0.0, -thickness / 2), (50.0, 50.0, thickness / 2), **contact)
+    return spec.compile()
+
+
+def thrown(height_m: float, speed_m_s: float = 0.0) -> Start:
+    """Return what puts the ball over the face and gives it a speed upwards."""
+
+    def start(data: mujoco.MjData) -> None:
+        data.qpos[2], data.qvel[2] = height_m, speed_m_s
+
+    return start
+
+
+# Impacts -------------------------------------------------------------------------------------
+
+
+def impact(
+    method: MujocoMethod, dt_s: float, ratio: float = 1.0, phase: float = 0.5
+) -> tuple[float, float]:
+    """Throw a weightless ball at 1 m/s at a floor; return its greatest depth and speed of return.
+
+    ``phase`` is the fraction of a step's way that it is in the floor when first seen there.
+    """
+    model = ball_on_box(method, dt_s, solref=(TAU_S, ratio))
+    data = started(model, thrown((1.0 - phase) * dt_s, -1.0))
+    path = record(model, data, 2 + math.ceil(10.0 * TAU_S / dt_s))
+    return -float(path.qpos[:, 2].min()), float(path.qvel[-1, 2])
+
+
+def worst_return(phase_step: float, ratio: float) -> float:
+    """Return how much faster than it came a ball can leave a contact, at any phase of arrival.
+
+    The Euler step of the unilateral spring, written out: while the ball is in the floor,
+    v += h max(0, w² x - 2 z w v) downwards, x -= h v. ``phase_step`` is h w, w = 1 / (tau z)
+    being the contact's natural frequency, and ``ratio`` its damping ratio z.
+    """
+    depth = phase_step * np.linspace(0.0, 1.0, 2001)
+    speed = np.ones_like(depth)
+    while True:
+        push = phase_step * (depth + 2.0 * ratio * speed)
+        pushed = (depth > 0.0) & (push > 0.0)
+        if not pushed.any():
+            return float(-speed.min())
+        speed -= np.where(pushed, push, 0.0)
+        depth += np.where(pushed, phase_step * speed, 0.0)
+
+
+def _penetration(method: MujocoMethod, _effort: Effort) -> float:
+    return impact(method, FINE_S)[0]
+
+
+def _restitution(method: MujocoMethod, _effort: Effort) -> float:
+    return impact(method, FINE_S)[1]
+
+
+def _return(dt_s: float, ratio: float, effort: Effort) -> float:
+    phases = np.linspace(1e-6, 1.0 - 1e-6, 4 * effort.phases).tolist()
+    return max(impact(EULER, dt_s, ratio, phase)[1] for phase in phases)
+
+
+def _bounce(method: MujocoMethod, dt_s: float, effort: Effort) -> float:
+    model = ball_on_box(method, dt_s, solref=(-1e5, 0.0), impedance=0.99, gravity=GRAVITY)
+    ratios = []
+    for drop in np.linspace(1.0, 1.05, effort.phases // 2).tolist():
+        path = record(model, started(model, thrown(drop)), round(10.0 / dt_s))
+        ratios.append(path.qpos[-round(2.2 / dt_s) :, 2].max() / drop)
+    return float(np.median(ratios))
+
+
+# Walls ---------------------------------------------------------------------------------------
+
+
+def tunnelling_speed(dt_s: float) -> float:
+    """Return the speed at which the ball's centre reaches the middle of the wall.
+
+    There the nearest face is the far one, and the contact pushes it out behind. The depth is
+    v tau / e if the step resolves the contact. If refsafe clamps tau to 2 h, the ball first seen a
+    whole step's way deep is stopped in that step: v h.
+    """
+    depth = RADIUS_M + WALL_M / 2
+    return depth / dt_s if 2.0 * dt_s >= TAU_S else math.e * depth / TAU_S
+
+
+def _stopped(dt_s: float, speculative: bool, speed: float, phase: float) -> bool:
+    model = ball_on_box(EULER, dt_s, thickness=WALL_M, speculative=speculative)
+    steps = 3 + math.ceil(20.0 * max(TAU_S, 2.0 * dt_s) / dt_s)
+    end = settled(model, steps * dt_s, thrown((2.0 - phase) * speed * dt_s, -speed))
+    return bool(end.qpos[2] + RADIUS_M > -WALL_M / 2)
+
+
+def _wall(dt_s: float, speculative: bool, effort: Effort, speed: float) -> bool:
+    # Not 0 nor 1: see the case of the ball that a step ends exactly touching.
+    phases = np.linspace(1e-4, 1.0 - 1e-4, effort.phases).tolist()
+    return all(_stopped(dt_s, speculative, speed, phase) for phase in phases)
+
+
+def _sweep(effort: Effort, rate_hz: float) -> bool:
+    """Say whether a speculative contact stops every ball; of 1/h, so that more is worse."""
+    speeds = np.linspace(1.02 * tunnelling_speed(1 / rate_hz), 120.0, effort.phases).tolist()
+    return all(_wall(1 / rate_hz, True, effort, speed) for speed in speeds)
+
+
+def _touching(_effort: Effort) -> float:
+    # Binary fractions, so that the floating-point way to the wall is exact.
+    return math.inf if _stopped(1 / 512, True, 256.0, 0.0) else 256.0
+
+
+# Friction ------------------------------------------------------------------------------------
+
+MU: Final = 0.5
+SLIP_M_S: Final = 0.03
+"""Speed after 4 s that is called slipping: it takes 0.15 % more than the friction."""
+
+CREEP_M_S: Final = (1.0 - IMPEDANCE) / IMPEDANCE * 0.9 * MU * GRAVITY * IMPEDANCE * TAU_S / 2.0
+"""Under 0.9 of the friction, which is a damper b = 2 / (d tau) of the acceleration, made soft by
+(1 - d) / d / impratio."""
+
+
+def slide(
+    method: MujocoMethod,
+    angle_deg: float,
+    seconds: float,
+    *,
+    push: float = 0.0,
+    speed: float = 0.0,
+    impratio: float = 1.0,
+) -> complex:
+    """Return the velocity, m/s, x + iy, of a resting mass after a throw and a lasting push.
+
+    Both are along ``angle_deg``, the push in parts of the friction mu m g, the throw in m/s.
+    """
+    model = ball_on_box(method, COARSE_S, friction=MU, gravity=GRAVITY, impratio=impratio)
+    data = settled(model, SETTLE_S)
+    along = np.array([math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))])
+    data.qfrc_applied[:2] = push * MU * GRAVITY * along
+    data.qvel[:2] += speed * along
+    mujoco.mj_step(model, data, round(seconds / COARSE_S))
+    return complex(*data.qvel[:2])
+
+
+def _friction(method: MujocoMethod, angle_deg: float, _effort: Effort, push: float) -> bool:
+    return abs(slide(method, angle_deg, 4.0, push=push, impratio=10.0)) < SLIP_M_S
+
+
+def _heading(method: MujocoMethod, _effort: Effort) -> float:
+    return float(np.angle(slide(method, 22.5, 0.2, speed=2.0), deg=True))
+
+
+def _hold(method: MujocoMethod, impratio: float, _effort: Effort) -> float:
+    return abs(slide(method, 45.0, 2.0, push=0.9, impratio=impratio))
+
+
+# Contacts that last --------------------------------------------------------------------------
+
+
+def _mocap(method: MujocoMethod, dt_s: float, tau_s: float, _effort: Effort) -> float:
+    contact = contact_of(0.0, (tau_s, 1.0), IMPEDANCE)
+    spec = new_spec(method, dt_s)
+    add_ball(spec, (0.0, 0.0, RADIUS_M), RADIUS_M, slides=np.eye(3).tolist(), **contact)
+    wall = spec.worldbody.add_body(mocap=True, pos=(-RADIUS_M - 0.1, 0.0, RADIUS_M))
+    wall.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 2.0, 2.0], **contact)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    start = float(data.mocap_pos[0, 0])
+
+    def move(step: int) -> None:
+        data.mocap_pos[0, 0] = start + step * dt_s
+
+    record(model, data, 200 + math.ceil(60.0 * tau_s / dt_s), before=move)
+    return float(data.mocap_pos[0, 0] - start - data.qpos[0])
+
+
+def _resting(method: MujocoMethod, effort: Effort, fraction: float) -> bool:
+    model = ball_on_box(method, fraction * TAU_S, gravity=GRAVITY, refsafe=False)
+    kick = 1e-9
+    data = started(model, thrown(-REST_M, kick))
+    return stays(model, data, effort.steps // 2, lambda: bool(abs(data.qvel[2]) < 1e3 * kick))
+
+
+def _crush(mass_ratio: float, tau_s: float, _effort: Effort) -> float:
+    contact = contact_of(0.0, (tau_s, 1.0), IMPEDANCE)
+    spec = new_spec(EULER, tau_s / 40.0, GRAVITY)
+    add_ball(spec, (0.0, 0.0, 10.0), 10.0, slides=UPWARDS, **contact)
+    add_box(spec, (0.0, 0.0, -1.0), (50.0, 50.0, 1.0), **contact)
+    block = spec.worldbody.add_body(pos=(0.0, 0.0, 25.0))
+    block.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=UPWARDS[0])
+    size = [5.0, 5.0, 5.0]
+    block.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=size, mass=mass_ratio, **contact)
+    # The soft pair settles with the time constant 2 (1 - d) tau M/m; it is given twelve of them.
+    seconds = tau_s * (20.0 + 24.0 * (1.0 - IMPEDANCE) * mass_ratio)
+    return -float(settled(spec.compile(), seconds).qpos[1])
+
+
+def _seam(dt_s: float, effort: Effort) -> float:
+    """Roll over four seams of coplanar tiles of 1 m."""
+    speed, seams = 5.0, 4
+    contact = contact_of(1.0, (TAU_S, 1.0), IMPEDANCE)
+    spec = new_spec(EULER, dt_s, GRAVITY)
+    add_ball(spec, (0.0, 0.0, RADIUS_M), RADIUS_M, **contact)
+    for tile in range(seams + 1):
+        add_box(spec, (tile, 0.0, -0.5), (0.5, 2.0, 0.5), **contact)
+    model = spec.compile()
+    bumps = []
+    for phase in np.linspace(0.0, 1.0, max(2, effort.phases // 4), endpoint=False):
+        data = mujoco.MjData(model)
+        data.qpos[0] = phase * speed * dt_s
+        mujoco.mj_step(model, data, round(SETTLE_S / dt_s))
+        data.qvel[0], data.qvel[4] = speed, speed / RADIUS_M
+        height = record(model, data, round(seams / (speed * dt_s))).qpos[:, 2]
+        bumps.append(height[1:].max() - height[0])
+    return float(np.median(bumps))
+
+
+# Hops ----------------------------------------------------------------------------------------
+
+HOP_M_S: Final = 4.0
+
+
+def hop_speed(dt_s: float, share: float) -> float:
+    """Return the speed, m/s, with which the game's skidding ball leaves the ground in a step.
+
+    MuJoCo's contact impulse p minimises 1/2 p A p - p (v_wanted - v) over the cone: normal A = 1/m,
+    tangential A = 7/2 / m on a sphere that can roll. The contact wants to remove ``share`` of the
+    slip, and gravity. On the cone p_t = mu p_n, so that p_n / m = (g h + mu s) / (1 + 7/2 mu²)
+    with s = share · slip, of which gravity takes g h. It does not depend on the step otherwise.
+
+    Source: Anitescu 2006, "Optimization-based simulation of nonsmooth rigid multibody dynamics".
+    """
+    mu, weight = game.FRICTION, game.GRAVITY_M_S2 * dt_s
+    return (weight + mu * share * HOP_M_S) / (1.0 + 3.5 * mu**2) - weight
+
+
+def soft_friction_model(preset: PhysicsPreset, share: float) -> mujoco.MjModel:
+    """Return the game's ball on a friction that removes ``share`` of the slip in a step.
+
+    Only an explicit contact pair has a ``solreffriction`` of its own.
+    """
+    spec = build_spec(game.make_level(), preset)
+    floor = next(geom for geom in spec.geoms if geom.name.startswith("solid_"))
+    spec.add_pair(
+        geomname1=floor.name,
+        geomname2="ball",
+        condim=3,
+        friction=[floor.friction[0], floor.friction[0], 0.0, 0.0, 0.0],
+        solref=list(floor.solref),
+        solimp=list(floor.solimp),
+        solreffriction=[0.0, -share / preset.dt_s],
+    )
+    return spec.compile()
+
+
+def _hop(dt_s: float, share: float | None, _effort: Effort) -> float:
+    preset = replace(PRESETS["default"], dt_s=dt_s)
+    if share is None:
+        model = compile_level(game.make_level(), preset).model
+    else:
+        model = soft_friction_model(preset, share)
+    data = mujoco.MjData(model)
+    data.qpos[:3] = 0.0, 0.0, game.RADIUS_M
+    mujoco.mj_step(model, data, round(SETTLE_S / dt_s))
+    data.qvel[0] = HOP_M_S
+    mujoco.mj_step(model, data)
+    return float(data.qvel[2])
+
+
+# All of them ---------------------------------------------------------------------------------
+
+
+def _impact_cases() -> Iterator[tuple[str, Case]]:
+    for method in (EULER, IMPLICITFAST, RK4, DISCRETE):
+        key = method.integrator.lower()
+        yield f"penetration_{key}", Case(TAU_S / math.e, value=partial(_penetration, method))
+        yield f"restitution_{key}", Case(math.exp(-2.0), value=partial(_restitution, method))
+    for rate, ratio in ((120, 0.1), (120, 0.2), (240, 0.1), (960, 0.1)):
+        predicted = worst_return(1 / rate / (TAU_S * ratio), ratio)
+        value = partial(_return, 1 / rate, ratio)
+        yield f"return_{rate}hz_ratio_{ratio:g}", Case(predicted, value=value)
+    for method, *steps in ((EULER, 0.004, 0.001, 0.00025), (RK4, 0.004, 0.001), (DISCRETE, 0.001)):
+        for dt_s in steps:
+            name = f"bounce_{method.integrator.lower()}_{1e3 * dt_s:g}ms"
+            yield name, Case(1.0, value=partial(_bounce, method, dt_s))
+    for dt_s in (0.0005, COARSE_S, 0.01, 0.02):
+        holds = partial(_wall, dt_s, False)
+        yield f"tunnelling_{1e3 * dt_s:g}ms", Case(tunnelling_speed(dt_s), None, holds, 1e-3)
+    for dt_s in (0.0005, COARSE_S, 0.005):
+        predicted = tunnelling_speed(dt_s) if dt_s < 0.001 else math.inf
+        holds = partial(_wall, dt_s, True)
+        yield f"speculative_{1e3 * dt_s:g}ms", Case(predicted, None, holds, 1e-3)
+    rate_hz = tunnelling_speed(FINE_S) / (WALL_M / 2)
+    yield "speculative_needs_large_steps", Case(rate_hz, holds=_sweep, tolerance=5e-3)
+    yield "speculative_exactly_touching", Case(math.inf, value=_touching)
+
+
+def _lasting_cases() -> Iterator[tuple[str, Case]]:
+    for method, predicted in (
+        (EULER, 2.0 * TAU_S),
+        (IMPLICITFAST, 2.0 * TAU_S),
+        (DISCRETE, 2.0 * TAU_S + COARSE_S),
+    ):
+        value = partial(_mocap, method, COARSE_S, TAU_S)
+        yield f"mocap_{method.integrator.lower()}", Case(predicted, value=value)
+    for dt_s in (0.008, 0.004):
+        value = partial(_mocap, EULER, dt_s, 0.005)
+        yield f"refsafe_{1e3 * dt_s:g}ms", Case(4.0 * dt_s, value=value)
+    for method, limit in (
+        (EULER, explicit_damping_limit),
+        (IMPLICITFAST, explicit_damping_limit),
+        (RK4, rk4_servo_limit),
+    ):
+        holds = partial(_resting, method)
+        yield f"resting_{method.integrator.lower()}", Case(limit(1.0), holds=holds)
+    for ratio, tau_s in ((1.0, TAU_S), (1000.0, TAU_S), (1000.0, TAU_S / 10)):
+        predicted = 2.0 * (1.0 - IMPEDANCE) * (1.0 + ratio) * GRAVITY * tau_s**2
+        value = partial(_crush, ratio, tau_s)
+        yield f"crush_1_to_{ratio:g}_tau_{1e3 * tau_s:g}ms", Case(predicted, value=value)
+
+
+def _rolling_cases() -> Iterator[tuple[str, Case]]:
+    for dt_s in (0.00002, COARSE_S):
+        case = Case(2.0 * REST_M / math.e, value=partial(_seam, dt_s))
+        yield f"seam_bump_{1e3 * dt_s:g}ms", case
+    for rate in (120, 240, 960):
+        predicted = hop_speed(1 / rate, DAMPING_STEPS)
+        yield f"hop_{rate}hz", Case(predicted, value=partial(_hop, 1 / rate, None))
+    for share in (0.5, 0.3):
+        predicted = hop_speed(1 / 240, share)
+        yield f"hop_friction_{share:g}", Case(predicted, value=partial(_hop, 1 / 240, share))
+
+
+def _friction_cases() -> Iterator[tuple[str, Case]]:
+    elliptic, pyramidal = EULER, MujocoMethod("Euler", "pyramidal")
+    across, angle = math.sqrt(0.5), math.radians(22.5)
+    bent = math.atan2(2.0 * math.sin(angle), 2.0 * math.cos(angle) - MU * GRAVITY * 0.2)
+    for method, angle_deg, predicted in (
+        (elliptic, 0.0, 1.0),
+        (elliptic, 45.0, 1.0),
+        (pyramidal, 0.0, 1.0),
+        (pyramidal, 45.0, across),
+    ):
+        holds = partial(_friction, method, angle_deg)
+        yield f"friction_{method.cone}_{angle_deg:g}deg", Case(predicted, holds=holds)
+    for method, predicted in ((elliptic, 22.5), (pyramidal, math.degrees(bent))):
+        yield f"heading_{method.cone}", Case(predicted, value=partial(_heading, method))
+    for method, impratio, predicted in (
+        (elliptic, 1.0, CREEP_M_S),
+        (elliptic, 10.0, CREEP_M_S / 10.0),
+        (pyramidal, 1.0, (0.9 - across) * MU * GRAVITY * 2.0),
+    ):
+        value = partial(_hold, method, impratio)
+        yield f"hold_{method.cone}_impratio_{impratio:g}", Case(predicted, value=value)
+
+
+CONTACTS: Final[Mapping[str, Case]] = dict(
+    (*_impact_cases(), *_friction_cases(), *_lasting_cases(), *_rolling_cases())
+)
+"""By name."""
