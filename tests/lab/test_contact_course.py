@@ -38,10 +38,10 @@ def until(scene: GameSceneType, moment_s: float) -> GameSceneType:
 def test_the_keys_go_through_the_games_rules() -> None:
     """They push, and the plate that the ball is driven onto sinks."""
     plan = played_plan("classic", COURSE.keys)
-    assert sum(one.seconds for one in plan) == pytest.approx(COURSE.horizon_s)
-    force = np.array([one.ctrl[:2] for one in plan])
+    assert sum(seconds for seconds, _ in plan) == pytest.approx(COURSE.horizon_s)
+    force = np.array([ctrl[:2] for _, ctrl in plan])
     np.testing.assert_allclose(np.unique(force), [-KEY_FORCE_N, 0.0, KEY_FORCE_N])
-    movers = np.array([one.ctrl[3:] for one in plan])
+    movers = np.array([ctrl[3:] for _, ctrl in plan])
     assert not movers[0].any()
     assert (movers[-1] < 0.0).any()
 

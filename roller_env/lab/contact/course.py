@@ -17,7 +17,7 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Final
+from typing import Final
 
 import mujoco
 import numpy as np
@@ -26,10 +26,16 @@ from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.compile.mjcf import build_spec
 from roller_env.config import make_config
 from roller_env.game.actions import KEY_FORCE_N
-from roller_env.lab.contact.scene import CONVERGED, BallScene, ContactScene, Held, MujocoTrial
+from roller_env.lab.contact.scene import (
+    CONVERGED,
+    BallScene,
+    ContactScene,
+    MujocoTrial,
+    Plan,
+    described,
+)
 from roller_env.lab.game import played
-from roller_env.lab.methods import MUJOCO, MujocoMethod
-from roller_env.lab.scene import Measure
+from roller_env.lab.methods import MujocoMethod
 from roller_env.lab.simulate import Path
 from roller_env.level import load_level
 from roller_env.physics.presets import PRESETS
@@ -49,7 +55,7 @@ class GameScene(BallScene):
         level: name of the level.
     """
 
-    level: str
+    level: str = "classic"
 
     @property
     def compiled(self) -> CompiledLevel:
@@ -58,7 +64,7 @@ class GameScene(BallScene):
 
     @property
     @abstractmethod
-    def plan(self) -> Sequence[Held]:
+    def plan(self) -> Plan:
         """What the actuators do."""
 
     def start(self, data: mujoco.MjData) -> None:
@@ -90,14 +96,14 @@ class GatePush(GameScene):
     """
 
     @property
-    def plan(self) -> Sequence[Held]:
+    def plan(self) -> Plan:
         """A push, half a second before the gate begins to move."""
         compiled = self.compiled
         pressing = np.zeros(compiled.model.nu)
         pressing[compiled.force_ctrl[0]] = KEY_FORCE_N
         lowering = pressing.copy()
         lowering[compiled.gate_ctrl[0]] = -compiled.level.gates[0].speed
-        return Held(0.5, pressing.tolist()), Held(self.horizon_s - 0.5, lowering.tolist())
+        return (0.5, pressing.tolist()), (self.horizon_s - 0.5, lowering.tolist())
 
     def start(self, data: mujoco.MjData) -> None:
         """Put the ball to the gate."""
@@ -115,70 +121,32 @@ class Course(GameScene):
     are quantised to control steps fall alike with every method.
     """
 
-    keys: Keys
+    keys: Keys = ()
 
     @property
-    def plan(self) -> Sequence[Held]:
+    def plan(self) -> Plan:
         """What the actuators did."""
         return played_plan(self.level, self.keys)
 
 
 @cache
-def played_plan(level: str, keys: Keys) -> tuple[Held, ...]:
+def played_plan(level: str, keys: Keys) -> Plan:
     """Play keys through the product's simulation, and return what its actuators did."""
     config = make_config(
         level=load_level(level), physics="accurate", control_dt_s=CONTROL_DT_S, num_threads=1
     )
     _, ctrl = played(config, keys, seed=0)
-    return tuple(Held(CONTROL_DT_S, row) for row in ctrl.tolist())
+    return tuple((CONTROL_DT_S, row) for row in ctrl.tolist())
 
 
-def _moments(said: Mapping[float, str]) -> dict[str, Any]:
-    return {
-        "moments_s": tuple(said),
-        "measures": tuple(
-            Measure(f"position_{moment:g}s", f"position error after {what}, m", "discretisation")
-            for moment, what in said.items()
-        ),
-    }
-
-
-GATE_PUSH: Final = GatePush(
-    name="gate-push",
-    title="A key presses the ball against the gate, which sinks",
-    horizon_s=3.6,
-    methods=MUJOCO,
-    time_steps_s=(0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4),
-    failure=0.1,
-    reference_step_s=4e-5,
-    level="gate",
-    **_moments(
-        {
-            3.6: "3.6 s, over the gate",
-            2.4: "2.4 s, pressed against the sinking gate",
-            0.4: "0.4 s, pressed against the resting gate",
-        }
-    ),
-)
+GATE_PUSH: Final = GatePush(**described("gate-push"), level="gate", moments_s=(3.6, 2.4, 0.4))
 COURSE: Final = Course(
-    name="course",
-    title="The classic course under a sequence of keys",
-    horizon_s=4.0,
-    methods=MUJOCO,
-    time_steps_s=(0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4),
-    failure=0.5,
+    **described("course"),
+    moments_s=(3.0, 2.0, 4.0),
     # After an impact RK4, too, is of first order: this reference is good to 2e-4 m (found by
     # halving its step), one of 4e-5 s to 1e-3 m.
     reference_step_s=1e-5,
-    level="classic",
     keys=(("w", 1.5), ("wa", 0.5), ("a", 0.5), ("s", 1.5)),
-    **_moments(
-        {
-            3.0: "3 s, thrown up by the plate's edge",
-            2.0: "2 s, before the first impact",
-            4.0: "4 s, off the wall",
-        }
-    ),
 )
 
 GAME_SCENES: Final[Sequence[ContactScene]] = (GATE_PUSH, COURSE)

@@ -21,12 +21,12 @@ from roller_env.lab.contact.scene import (
     add_ball,
     add_ground,
     contact_of,
+    described,
     game_contact,
     new_spec,
 )
 from roller_env.lab.game import GRAVITY_M_S2, MASS_KG, RADIUS_M
-from roller_env.lab.methods import MUJOCO, MujocoMethod
-from roller_env.lab.scene import Measure
+from roller_env.lab.methods import MujocoMethod
 from roller_env.lab.simulate import Float64, Path
 from roller_env.physics.materials import IMPEDANCE, damping_ratio
 from roller_env.physics.presets import PhysicsPreset
@@ -205,34 +205,7 @@ def returned_speed(path: Path) -> Float64:
     return speed
 
 
-BOUNCE: Final = Bounce(
-    name="bounce",
-    title="A ball drops 1 m on a spring and bounces",
-    horizon_s=2.0,
-    measures=(
-        Measure("position", "height error after 2 s against the drop", "discretisation"),
-        Measure("rigid", "height error after 2 s against a rigid ball's", "model"),
-    ),
-    methods=MUJOCO,
-    time_steps_s=(0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4),
-    failure=0.5,
-)
-_COEFFICIENT: Final = "largest error of the coefficient of restitution"
-RESTITUTION: Final = Restitution(
-    name="restitution",
-    title="Balls of every elasticity strike the ground at 0.2 to 20 m/s",
-    horizon_s=0.2,
-    measures=(
-        Measure("worst", _COEFFICIENT, "model"),
-        Measure("fast", "the same at 2 m/s and more", "model"),
-        *(
-            Measure(f"e={one:g}", f"{_COEFFICIENT} of elasticity {one:g}", "model")
-            for one in ELASTICITIES
-        ),
-    ),
-    methods=MUJOCO,
-    time_steps_s=(0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4),
-    failure=0.5,
-)
+BOUNCE: Final = Bounce(**described("bounce"))
+RESTITUTION: Final = Restitution(**described("restitution"))
 
 IMPACTS: Final[Sequence[ContactScene]] = (BOUNCE, RESTITUTION)

@@ -1,18 +1,12 @@
 """A ball on the level and on a slope, pushed, rolling and skidding.
 
-What is expected (all of it held by the tests):
-
-- *Discretisation*, pushed from rest or down a slope: every integrator of the Euler family takes
-  the velocity at the end of a step for the whole step, so after n steps the ball is at
-  a h² n (n + 1) / 2 and its relative error is exactly h / T, whatever the force. RK4 has none.
-- *Model*: the ball rests a depth delta in the ground and MuJoCo puts the contact half way, so the
-  lever of friction is r - delta / 2 and a = F / (m + I / (r - delta / 2)²), which is lower than
-  the rigid ball's by (2/7) delta / r.
-- *Skid to roll*: with the elliptic cone after 2 v0 / (7 mu g) at every heading, give or take a
-  hop: friction's impulse is mu times the normal one, so the slip is v0 - 7/2 mu (g t + v_z). The
-  pyramidal cone's edges are the world's axes: at 45 degrees its friction is mu / sqrt(2), and
-  between it bends the path. No friction changes the angular momentum about a point of the ground,
-  so a skid ends at exactly 5/7 of the start's velocity with any cone.
+What is expected, all of it held by the tests: every integrator of the Euler family takes the
+velocity at the end of a step for the whole step, so a ball that is pushed from rest or rolls down a
+slope is ahead by h / T, whatever the force. RK4 has no such error. MuJoCo puts the contact of a
+ball that rests a depth delta in the ground half way, so it rolls on a lever shortened by delta / 2,
+which is worth (2/7) delta / r. A skid ends after 2 v0 / (7 mu g) at every heading, give or take a
+hop, at 5/7 of its velocity. The pyramidal cone's edges are the world's axes: at 45 degrees its
+friction is mu / sqrt(2), and between it bends the path.
 """
 
 from __future__ import annotations
@@ -20,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Final
 
 import mujoco
@@ -35,13 +28,13 @@ from roller_env.lab.contact.scene import (
     add_ball,
     add_ground,
     contact_of,
+    described,
     game_contact,
     new_spec,
     resting_depth,
 )
 from roller_env.lab.game import FRICTION, GRAVITY_M_S2, MASS_KG, RADIUS_M
-from roller_env.lab.methods import MUJOCO, PYRAMIDAL, MujocoMethod
-from roller_env.lab.scene import Measure
+from roller_env.lab.methods import MUJOCO, PYRAMIDAL, Method, MujocoMethod
 from roller_env.lab.simulate import Float64, Path
 
 IMPRATIO: Final = 10.0
@@ -72,6 +65,8 @@ class SteadyRoll(BallScene):
         force_n: through the ball's centre, along +x; 0 on the slope.
     """
 
+    moments_s: Sequence[float] = (2.0,)
+    reference_step_s: float = 2.0 / 7000.0
     slope_deg: float = 0.0
     force_n: float = 0.0
 
@@ -119,6 +114,9 @@ class Skid(BallScene):
         speed_m_s: of the throw.
     """
 
+    methods: Sequence[Method] = (*MUJOCO, *PYRAMIDAL)
+    moments_s: Sequence[float] = (0.5,)
+    reference_step_s: float = 0.5 / 28_000.0
     heading_deg: float = 0.0
     speed_m_s: float = 3.0
 
@@ -187,39 +185,10 @@ def slip_speed(path: Path) -> Float64:
     return np.asarray(np.linalg.norm((path.qvel[:, :3] + np.cross(spin, contact))[:, :2], axis=1))
 
 
-_steady = partial(
-    SteadyRoll,
-    horizon_s=2.0,
-    measures=(
-        Measure("position", "position error against the way after 2 s", "discretisation"),
-        Measure("acceleration", "position error against (5/7) a t²/2 after 2 s", "model"),
-    ),
-    methods=MUJOCO,
-    time_steps_s=(0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4),
-    failure=0.05,
-    moments_s=(2.0,),
-    reference_step_s=2.0 / 7000.0,
-)
-INCLINE: Final = _steady("incline", "A ball rolls down a slope of 20°", slope_deg=20.0)
-PUSH: Final = _steady("push", "A key pushes a ball over level ground", force_n=KEY_FORCE_N)
+INCLINE: Final = SteadyRoll(**described("incline"), slope_deg=20.0)
+PUSH: Final = SteadyRoll(**described("push"), force_n=KEY_FORCE_N)
 SKIDS: Final = tuple(
-    Skid(
-        name=f"skid-{heading_deg:g}",
-        title=f"A skidding ball begins to roll, thrown at {heading_deg:g}°",
-        horizon_s=0.5,
-        measures=(
-            Measure("position", "position error after 0.5 s, m", "discretisation"),
-            Measure("roll_time", "error of the time to roll against 2 v/(7 µ g)", "model"),
-            Measure("heading", "largest error of the heading, degrees", "model"),
-            Measure("place", "position error against the rigid ball after 0.5 s, m", "model"),
-        ),
-        methods=(*MUJOCO, *PYRAMIDAL),
-        time_steps_s=(0.02, 0.01, 0.005, 0.002, 0.001, 5e-4, 2e-4, 1e-4),
-        failure=0.05,
-        moments_s=(0.5,),
-        reference_step_s=0.5 / 28_000.0,
-        heading_deg=heading_deg,
-    )
+    Skid(**described(f"skid-{heading_deg:g}"), heading_deg=heading_deg)
     for heading_deg in (0.0, 22.5, 45.0)
 )
 

@@ -1,4 +1,8 @@
-"""What contact scenes share: worlds and balls, the trial that is recorded and timed, the scene."""
+"""What contact scenes share: worlds and balls, the trial that is recorded and timed, the scene.
+
+``scenes.csv`` has what charts and tables say of each, its time steps, largest first, and the value
+of its first measure above which a method has failed.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +11,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, Final, NamedTuple
+from pathlib import Path as File
+from typing import Any, Final
 
 import mujoco
 import numpy as np
+from pandas import read_csv
 
 from roller_env.lab.game import FRICTION
-from roller_env.lab.methods import Cone, Method, MujocoMethod, without_warnings
+from roller_env.lab.methods import MUJOCO, Cone, Method, MujocoMethod, without_warnings
 from roller_env.lab.scene import Measure
 from roller_env.lab.simulate import Float64, Path, Start, record
 from roller_env.physics.materials import IMPEDANCE, contact_parameters
@@ -29,12 +35,16 @@ UPWARDS: Final = ((0.0, 0.0, 1.0),)
 def new_spec(
     method: MujocoMethod, dt_s: float, gravity_m_s2: float = 0.0, **options: Any
 ) -> mujoco.MjSpec:
-    """Return an empty world with the method's settings, and further ones of ``mjOption``."""
+    """Return an empty world with the method's settings, and further ones of ``mjOption``.
+
+    Flags are added to those that the method has set.
+    """
     spec = mujoco.MjSpec()
     method.configure(spec, dt_s)
     spec.option.gravity = [0.0, 0.0, -gravity_m_s2]
     for name, value in options.items():
-        setattr(spec.option, name, value)
+        set_already = getattr(spec.option, name)
+        setattr(spec.option, name, set_already | value if name.endswith("flags") else value)
     return spec
 
 
@@ -119,14 +129,10 @@ def steps_of(seconds: float, dt_s: float) -> int:
     return steps
 
 
-class Held(NamedTuple):
-    """Controls, (nu,) MuJoCo's, and for how many seconds they are held."""
-
-    seconds: float
-    ctrl: Sequence[float] = ()
-
-
 _STATE: Final = mujoco.mjtState.mjSTATE_INTEGRATION
+
+Plan = Sequence[tuple[float, Sequence[float]]]
+"""Seconds, and MuJoCo's controls, (nu,), that are held so long, one after the other."""
 
 
 class MujocoTrial:
@@ -146,8 +152,8 @@ class MujocoTrial:
         spec: mujoco.MjSpec,
         judge: Callable[[Path], Mapping[str, float]],
         start: Start | None = None,
-        plan: Sequence[Held] = (),
-        part: slice = slice(None),
+        plan: Plan = (),
+        timed_s: tuple[float, float] | None = None,
     ):
         """Prepare a simulation.
 
@@ -156,23 +162,25 @@ class MujocoTrial:
             spec: the world.
             judge: errors of a path by the name of their measure; only ever given finite paths.
             start: puts freshly reset data where the motion begins.
-            plan: the controls of the whole motion; none are needed.
-            part: which pieces of the plan are timed. Its first needs `run` to have passed it.
+            plan: controls of the whole motion, if it has any.
+            timed_s: begin and end of what is timed, if that is not all. `run` must have passed it.
         """
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
-        self._scene, self._judge, self._start, self._part = scene, judge, start, part
-        self._plan = [
-            (steps_of(held.seconds, self.model.opt.timestep), np.array(held.ctrl, dtype=float))
-            for held in plan or (Held(scene.horizon_s),)
-        ]
+        self._scene, self._judge, self._start = scene, judge, start
+        dt_s = self.model.opt.timestep
+        self._plan = [(steps_of(s, dt_s), ctrl) for s, ctrl in plan or ((scene.horizon_s, ()),)]
+        self._steps = sum(steps for steps, _ in self._plan)
+        self._part = range(self._steps)
+        if timed_s is not None:
+            self._part = range(*(round(moment / dt_s) for moment in timed_s))
         self._before_part = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         self._path: Path | None = None
 
     @property
     def part_s(self) -> float:
         """Simulated time of what `run_part` simulates, seconds."""
-        return float(sum(steps for steps, _ in self._plan[self._part]) * self.model.opt.timestep)
+        return float(len(self._part) * self.model.opt.timestep)
 
     def run(self) -> None:
         """Simulate the whole motion and keep its path."""
@@ -180,23 +188,22 @@ class MujocoTrial:
         mujoco.mj_resetData(model, data)
         if self._start is not None:
             self._start(data)
-        *begins, end = np.cumsum([0, *(steps for steps, _ in self._plan)]).tolist()
-        part_begins = begins[self._part][0]
+        begins = np.cumsum([0, *(steps for steps, _ in self._plan)]).tolist()[:-1]
 
         def control(step: int) -> None:
-            if step == part_begins:
+            if step == self._part.start:
                 mujoco.mj_getState(model, data, self._before_part, _STATE)
             if step in begins:
                 data.ctrl[:] = self._plan[begins.index(step)][1]
 
-        self._path = record(model, data, end, before=control)
+        self._path = record(model, data, self._steps, before=control)
 
     def run_part(self) -> None:
-        """Simulate the part that is timed."""
+        """Simulate the part that is timed; a motion with a plan is timed as a whole."""
         mujoco.mj_setState(self.model, self.data, self._before_part, _STATE)
-        for steps, ctrl in self._plan[self._part]:
+        for steps, ctrl in self._plan:
             self.data.ctrl[:] = ctrl
-            mujoco.mj_step(self.model, self.data, steps)
+            mujoco.mj_step(self.model, self.data, min(steps, len(self._part)))
 
     @property
     def path(self) -> Path:
@@ -214,6 +221,23 @@ class MujocoTrial:
         return {measure.name: math.nan for measure in self._scene.measures}
 
 
+_WORDS: Final = read_csv(File(__file__).with_name("scenes.csv"))
+
+
+def described(scene: str) -> dict[str, Any]:
+    """Return what ``scenes.csv`` says of a scene: arguments of a `ContactScene`."""
+    rows = _WORDS[_WORDS.scene == scene]
+    first = rows.iloc[0]
+    return {
+        "name": scene,
+        "title": first.title,
+        "horizon_s": float(first.horizon_s),
+        "measures": tuple(Measure(row.measure, row.label, row.kind) for row in rows.itertuples()),
+        "time_steps_s": tuple(map(float, first.time_steps_s.split())),
+        "failure": float(first.failure),
+    }
+
+
 @dataclass(frozen=True)
 class ContactScene(ABC):
     """A scene that MuJoCo simulates; see `roller_env.lab.scene.Scene`.
@@ -226,9 +250,9 @@ class ContactScene(ABC):
     title: str
     horizon_s: float
     measures: Sequence[Measure]
-    methods: Sequence[Method]
     time_steps_s: Sequence[float]
     failure: float
+    methods: Sequence[Method] = MUJOCO
 
     def trial(self, method: Method, dt_s: float) -> MujocoTrial:
         """Return a simulation of the scene, ready to run.
@@ -258,8 +282,8 @@ class BallScene(ContactScene):
             compared with itself.
     """
 
-    moments_s: Sequence[float]
-    reference_step_s: float
+    moments_s: Sequence[float] = ()
+    reference_step_s: float = 4e-5
 
     def places(self, path: Path) -> Float64:
         """Return where the ball is at the scene's moments, (moments, 3) metres."""

@@ -30,7 +30,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path as File
 from typing import Any, Final
 
@@ -42,14 +41,13 @@ from scipy.spatial.distance import pdist
 from roller_env.lab.contact.impact import calibrated
 from roller_env.lab.contact.scene import (
     ContactScene,
-    Held,
     MujocoTrial,
     add_ball,
     add_ground,
+    described,
     new_spec,
 )
-from roller_env.lab.methods import MUJOCO, PYRAMIDAL, MujocoMethod
-from roller_env.lab.scene import Measure
+from roller_env.lab.methods import MUJOCO, PYRAMIDAL, Method, MujocoMethod
 from roller_env.lab.simulate import Float64, Path
 
 GRAVITY_M_S2: Final = 9.81
@@ -85,7 +83,8 @@ class Rolling(ContactScene):
         direction: (x, y) unit vector of the push.
     """
 
-    direction: tuple[float, float]
+    methods: Sequence[Method] = (*MUJOCO, *PYRAMIDAL)
+    direction: tuple[float, float] = (0.0, 1.0)
 
     force_n = 150.0
     box_kg = 10.0
@@ -127,19 +126,13 @@ class Rolling(ContactScene):
         def judge(path: Path) -> Mapping[str, float]:
             return {"velocity": self.error(path.time, path.qvel[:, :3], path.qvel[:, 6:9])}
 
-        plan = Held(0.2), Held(self.horizon_s - 0.2)
-        return MujocoTrial(self, spec, judge, push, plan, slice(0, 1))
+        return MujocoTrial(self, spec, judge, push, timed_s=(0.0, 0.2))
 
     def error(self, time: Float64, box: Float64, ball: Float64) -> float:
-        """Return SimBenchmark's error: the mean over time of both squared velocity errors.
+        """Return SimBenchmark's error, (m/s)²: the mean over time of both squared velocity errors.
 
-        Args:
-            time: (S + 1,) seconds.
-            box: (S + 1, 3) velocities of the box, m/s.
-            ball: (S + 1, 3) velocities of the first ball, m/s.
-
-        Returns:
-            (m/s)², over the samples at the beginnings of the steps.
+        Of times (S + 1,) and velocities (S + 1, 3), m/s, of the box and of the first ball; the
+        samples are those at the beginnings of the steps.
         """
         squares = 0.0
         way = np.append(self.direction, 0.0)
@@ -175,18 +168,13 @@ class Bouncing(ContactScene):
         def judge(path: Path) -> Mapping[str, float]:
             return {"energy": self.error(path.qpos[:, 2::7], path.qvel.reshape(-1, 49, 6))}
 
-        plan = Held(2.0), Held(self.horizon_s - 2.0)
-        return MujocoTrial(self, spec, judge, plan=plan, part=slice(0, 1))
+        return MujocoTrial(self, spec, judge, timed_s=(0.0, 2.0))
 
     def error(self, height: Float64, velocity: Float64) -> float:
-        """Return SimBenchmark's error: the mean over time of the squared error of the energy.
+        """Return SimBenchmark's error, J²: the mean over time of the squared error of the energy.
 
-        Args:
-            height: (S + 1, balls) of the centres, metres.
-            velocity: (S + 1, balls, 6) linear and angular, m/s and rad/s.
-
-        Returns:
-            J², over the samples at the beginnings of the steps.
+        Of heights (S + 1, balls) of the centres, m, and velocities (S + 1, balls, 6), linear and
+        angular, m/s and rad/s; the samples are those at the beginnings of the steps.
         """
         inertia = 0.4 * self.ball_kg * self.radius_m**2
         doubled = self.ball_kg * velocity[..., :3] ** 2 + inertia * velocity[..., 3:] ** 2
@@ -237,80 +225,26 @@ class SixSixSix(ContactScene):
             published = np.array([self.empty_sample_m2, *squares[1:]])
             return {"penetration": float(squares.mean()), "as_published": float(published.mean())}
 
-        # Timed from 1 s to 1.5 s, while the pile falls apart.
-        plan = Held(1.0), Held(0.5), Held(self.horizon_s - 1.5)
-        return MujocoTrial(self, spec, judge, plan=plan, part=slice(1, 2))
+        # Timed while the pile falls apart.
+        return MujocoTrial(self, spec, judge, timed_s=(1.0, 1.5))
 
 
 def squared_penetration(centres: Float64, radius_m: float) -> float:
-    """Return the sum of squared overlaps, m², of balls with each other and with the ground.
-
-    Args:
-        centres: (balls, 3) metres.
-        radius_m: of every ball.
-    """
+    """Return the sum of squared overlaps, m², of balls at (balls, 3) m, and with the ground."""
     balls = np.maximum(2.0 * radius_m - pdist(centres), 0.0)
     ground = np.maximum(radius_m - centres[:, 2], 0.0)
     return float((balls**2).sum() + (ground**2).sum())
 
 
-_rolling = partial(
-    Rolling,
-    horizon_s=4.0,
-    measures=(Measure("velocity", "mean squared velocity error over 4 s, (m/s)²", "model"),),
-    methods=(*MUJOCO, *PYRAMIDAL),
-    time_steps_s=(0.02, 0.01, 0.005, 0.002, 0.001),
-    # A third of that of a box which does not move, 3.14.
-    failure=1.0,
-)
-_pile = partial(
-    SixSixSix,
-    horizon_s=10.0,
-    measures=(
-        Measure("penetration", "mean squared penetration over 10 s, m²", "model"),
-        Measure("as_published", "the same with SimBenchmark's empty first sample, m²", "model"),
-    ),
-    # About that of 216 balls which overlap every neighbour by a fifth of their diameter.
-    failure=1.0,
-)
-
-ROLLING_Y: Final = _rolling(
-    "rolling-y", "SimBenchmark rolling: a box under 25 balls is pushed, along y", direction=(0.0, 1)
-)
-ROLLING_XY: Final = _rolling(
-    "rolling-xy",
-    "SimBenchmark rolling: a box under 25 balls is pushed, 60° from x",
-    direction=(0.5, math.sqrt(0.75)),
-)
-BOUNCING: Final = Bouncing(
-    name="bouncing",
-    title="SimBenchmark bouncing: 49 balls drop 5 m, elasticity 1",
-    horizon_s=20.0,
-    measures=(Measure("energy", "mean squared energy error over 20 s, J²", "model"),),
-    methods=MUJOCO,
-    time_steps_s=(0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001),
-    # That of balls which lose half their energy.
-    failure=(Bouncing.energy_j / 2.0) ** 2,
-)
-PILE: Final = _pile(
-    "666",
-    "SimBenchmark 666: 216 smooth balls collapse",
-    methods=MUJOCO,
-    time_steps_s=(0.1, 0.05, 0.02, 0.01, 0.005),
-)
-DROPPED_PILE: Final = _pile(
-    "666-dropped",
-    "SimBenchmark 666 as its MuJoCo file has it: dropped from 1.2 m, friction 0.8",
+ROLLING_Y: Final = Rolling(**described("rolling-y"))
+ROLLING_XY: Final = Rolling(**described("rolling-xy"), direction=(0.5, math.sqrt(0.75)))
+BOUNCING: Final = Bouncing(**described("bouncing"))
+PILE: Final = SixSixSix(**described("666"))
+DROPPED_PILE: Final = SixSixSix(
+    **described("666-dropped"),
     methods=(MujocoMethod("Euler"), MujocoMethod("RK4")),
-    time_steps_s=(0.1, 0.02, 0.01),
     lowest_m=1.311,
     friction=0.8,
 )
 
-SIMBENCHMARK: Final[Sequence[ContactScene]] = (
-    ROLLING_Y,
-    ROLLING_XY,
-    BOUNCING,
-    PILE,
-    DROPPED_PILE,
-)
+SIMBENCHMARK: Final[Sequence[ContactScene]] = (ROLLING_Y, ROLLING_XY, BOUNCING, PILE, DROPPED_PILE)

@@ -44,6 +44,7 @@ FINE_S: Final = TAU_S / 400
 """A step that resolves a contact; what remains of the discretisation is about h / tau."""
 SETTLE_S: Final = 0.5
 """After which what was put down no longer sinks."""
+SPECULATIVE: Final = int(mujoco.mjtEnableBit.mjENBL_SPECULATIVE)
 REST_M: Final = (1.0 - IMPEDANCE) * GRAVITY * TAU_S**2
 """Depth at which a ball rests in the floor."""
 
@@ -65,20 +66,14 @@ def ball_on_box(
     friction: float = 0.0,
     gravity: float = 0.0,
     thickness: float = 2.0,
-    speculative: bool = False,
-    refsafe: bool = True,
-    impratio: float = 1.0,
+    **options: float,
 ) -> mujoco.MjModel:
     """Return a wide box whose upper face is at z = 0, and on it a ball that cannot turn.
 
     ``qpos`` is the way of the ball, of 1 kg and `RADIUS_M`, from where it touches the face. The
     parameters of the contact are the same on both geoms, so that nothing is mixed.
     """
-    spec = new_spec(method, dt_s, gravity, impratio=impratio)
-    if speculative:
-        spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_SPECULATIVE
-    if not refsafe:
-        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_REFSAFE
+    spec = new_spec(method, dt_s, gravity, **options)
     contact = contact_of(friction, solref, impedance)
     add_ball(spec, (0.0, 0.0, RADIUS_M), RADIUS_M, slides=np.eye(3).tolist(), **contact)
     add_box(spec, (0.0, 0.0, -thickness / 2), (50.0, 50.0, thickness / 2), **contact)
@@ -164,28 +159,28 @@ def tunnelling_speed(dt_s: float) -> float:
     return depth / dt_s if 2.0 * dt_s >= TAU_S else math.e * depth / TAU_S
 
 
-def _stopped(dt_s: float, speculative: bool, speed: float, phase: float) -> bool:
-    model = ball_on_box(EULER, dt_s, thickness=WALL_M, speculative=speculative)
+def _stopped(dt_s: float, flags: int, speed: float, phase: float) -> bool:
+    model = ball_on_box(EULER, dt_s, thickness=WALL_M, enableflags=flags)
     steps = 3 + math.ceil(20.0 * max(TAU_S, 2.0 * dt_s) / dt_s)
     end = settled(model, steps * dt_s, thrown((2.0 - phase) * speed * dt_s, -speed))
     return bool(end.qpos[2] + RADIUS_M > -WALL_M / 2)
 
 
-def _wall(dt_s: float, speculative: bool, effort: Effort, speed: float) -> bool:
+def _wall(dt_s: float, flags: int, effort: Effort, speed: float) -> bool:
     # Not 0 nor 1: see the case of the ball that a step ends exactly touching.
     phases = np.linspace(1e-4, 1.0 - 1e-4, effort.phases).tolist()
-    return all(_stopped(dt_s, speculative, speed, phase) for phase in phases)
+    return all(_stopped(dt_s, flags, speed, phase) for phase in phases)
 
 
 def _sweep(effort: Effort, rate_hz: float) -> bool:
     """Say whether a speculative contact stops every ball; of 1/h, so that more is worse."""
     speeds = np.linspace(1.02 * tunnelling_speed(1 / rate_hz), 120.0, effort.phases).tolist()
-    return all(_wall(1 / rate_hz, True, effort, speed) for speed in speeds)
+    return all(_wall(1 / rate_hz, SPECULATIVE, effort, speed) for speed in speeds)
 
 
 def _touching(_effort: Effort) -> float:
     # Binary fractions, so that the floating-point way to the wall is exact.
-    return math.inf if _stopped(1 / 512, True, 256.0, 0.0) else 256.0
+    return math.inf if _stopped(1 / 512, SPECULATIVE, 256.0, 0.0) else 256.0
 
 
 # Friction ------------------------------------------------------------------------------------
@@ -254,8 +249,8 @@ def _mocap(method: MujocoMethod, dt_s: float, tau_s: float, _effort: Effort) -> 
 
 
 def _resting(method: MujocoMethod, effort: Effort, fraction: float) -> bool:
-    model = ball_on_box(method, fraction * TAU_S, gravity=GRAVITY, refsafe=False)
-    kick = 1e-9
+    kick, unsafe = 1e-9, int(mujoco.mjtDisableBit.mjDSBL_REFSAFE)
+    model = ball_on_box(method, fraction * TAU_S, gravity=GRAVITY, disableflags=unsafe)
     data = started(model, thrown(-REST_M, kick))
     return stays(model, data, effort.steps // 2, lambda: bool(abs(data.qvel[2]) < 1e3 * kick))
 
@@ -363,11 +358,11 @@ def _impact_cases() -> Iterator[tuple[str, Case]]:
             name = f"bounce_{method.integrator.lower()}_{1e3 * dt_s:g}ms"
             yield name, Case(1.0, value=partial(_bounce, method, dt_s))
     for dt_s in (0.0005, COARSE_S, 0.01, 0.02):
-        holds = partial(_wall, dt_s, False)
+        holds = partial(_wall, dt_s, 0)
         yield f"tunnelling_{1e3 * dt_s:g}ms", Case(tunnelling_speed(dt_s), None, holds, 1e-3)
     for dt_s in (0.0005, COARSE_S, 0.005):
         predicted = tunnelling_speed(dt_s) if dt_s < 0.001 else math.inf
-        holds = partial(_wall, dt_s, True)
+        holds = partial(_wall, dt_s, SPECULATIVE)
         yield f"speculative_{1e3 * dt_s:g}ms", Case(predicted, None, holds, 1e-3)
     rate_hz = tunnelling_speed(FINE_S) / (WALL_M / 2)
     yield "speculative_needs_large_steps", Case(rate_hz, holds=_sweep, tolerance=5e-3)

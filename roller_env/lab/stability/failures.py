@@ -210,7 +210,7 @@ def tunnelling() -> Failure:
         lambda path: -1e3 * path.qpos[:, 2],
         (
             setting("tau = 20 ms", TAU_S),
-            setting("tau = 20 ms, speculative contacts", TAU_S, speculative=True),
+            setting("tau = 20 ms, speculative contacts", TAU_S, enableflags=contacts.SPECULATIVE),
             setting("tau = 5 ms", 0.005),
         ),
     )

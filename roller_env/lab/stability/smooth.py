@@ -134,10 +134,8 @@ def _our_drag(method: Integrator, _effort: Effort, phase: float) -> bool:
     return all(abs(reached.velocity[0, 0]) <= 1.0 for reached in motion)
 
 
-def _mujoco_drag(method: MujocoMethod, eulerdamp: bool, effort: Effort, phase: float) -> bool:
-    spec = new_spec(method, DT_S)
-    if not eulerdamp:
-        spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+def _mujoco_drag(method: MujocoMethod, flags: int, effort: Effort, phase: float) -> bool:
+    spec = new_spec(method, DT_S, disableflags=flags)
     add_ball(spec, (0.0, 0.0, 0.0), 0.5)
     (joint,) = spec.joints
     joint.damping[0] = phase / DT_S
@@ -211,14 +209,15 @@ def _cases() -> Iterator[tuple[str, Case]]:
             yield f"servo_{key}_{ratio:g}", Case(limit(ratio), holds=holds)
     for name, integrator in INTEGRATORS.items():
         yield f"drag_{name}", Case(drag_limit(integrator), holds=partial(_our_drag, integrator))
-    for key, method, eulerdamp, predicted in (
-        ("rk4", RK4, True, drag_limit(INTEGRATORS["rk4"])),
-        ("euler_explicit", EULER, False, 2.0),
-        ("euler", EULER, True, math.inf),
-        ("implicitfast", IMPLICITFAST, True, math.inf),
-        ("discrete", DISCRETE, True, math.inf),
+    explicit = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
+    for key, method, flags, predicted in (
+        ("rk4", RK4, 0, drag_limit(INTEGRATORS["rk4"])),
+        ("euler_explicit", EULER, explicit, 2.0),
+        ("euler", EULER, 0, math.inf),
+        ("implicitfast", IMPLICITFAST, 0, math.inf),
+        ("discrete", DISCRETE, 0, math.inf),
     ):
-        holds = partial(_mujoco_drag, method, eulerdamp)
+        holds = partial(_mujoco_drag, method, flags)
         yield f"drag_mujoco_{key}", Case(predicted, holds=holds)
     for phase in (0.01, 0.1, 0.2):
         growth = (1.0 + phase**2) ** (OUR_STEPS / 2)
