@@ -1,14 +1,10 @@
 """The game itself as a scene: its own levels, servos and contacts, under keys held open loop.
 
 The product scales its contacts with the time step; a curve of errors over steps needs one model.
-So the levels are compiled once with the default preset's contacts, the softest that a player meets
-but for ``fast``, and only the integrator and the step vary.
-
-What to expect: contact damping times h reaches 2 at h = 9.3 ms, and the movers' servos (200 rad/s,
-critically damped) take Euler to 4.1 ms, RK4 to 13.9 ms and implicitfast to 24 ms.
-Before any impact the Euler family errs by h/T. Every impact falls somewhere into a step, which is
-first order for every method; after a few of them the ball's path is a matter of chance, so the
-horizon is short.
+So the levels are compiled once with the default preset's contacts, and only the integrator and the
+step vary. Contact damping times h reaches 2 at h = 9.3 ms, and the movers' servos (200 rad/s,
+critically damped) take Euler to 4.1 ms, RK4 to 13.9 ms and implicitfast to 24 ms. Every impact is
+first order for every method, and after a few the ball's path is a matter of chance.
 """
 
 from __future__ import annotations
@@ -49,11 +45,7 @@ Keys = tuple[tuple[str, float], ...]
 
 @dataclass(frozen=True)
 class GameScene(BallScene):
-    """A shipped level that is played open loop.
-
-    Attributes:
-        level: name of the level.
-    """
+    """A shipped ``level`` that is played open loop."""
 
     level: str = "classic"
 
@@ -89,11 +81,7 @@ def _compiled(level: str) -> CompiledLevel:
 
 
 class GatePush(GameScene):
-    """A key presses the ball against the gate while the servo lowers it past the ball.
-
-    Three bodies of the product meet: the ball on the floor, its side on the sliding gate, whose
-    friction drags it down, and the servo of 100 times its mass.
-    """
+    """A key presses the ball against the gate while the servo, of 100 times its mass, lowers it."""
 
     @property
     def plan(self) -> Plan:

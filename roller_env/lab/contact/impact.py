@@ -48,13 +48,10 @@ def falling_balls(
 class Bounce(ContactScene):
     """A ball dropped on a spring-damper that stays the same at every step.
 
-    The answer to *discretisation* is not a simulation with a small step but the contact's own law,
-    integrated from event to event (`soft_bounce`): the step that touching falls into is wrong to
-    first order with every method, RK4 included, since none of them looks for the event. It misses
-    up to half of what the damper, which sets in at once, gives in a step (RK4: a third). So one run
-    says little about a method: its error has the luck of where in a step the ball touches, and
-    changes with anything that moves that. The *model* error is the distance from a rigid ball that
-    loses 1 - e of its speed in no time.
+    *Discretisation* is the distance from the contact's own law, integrated from event to event
+    (`soft_bounce`): the step that touching falls into is wrong to first order with every method,
+    RK4 included, since none looks for the event. So one run has the luck of where in a step the
+    ball touches. *Model* is the distance from a rigid ball that loses 1 - e of its speed at once.
 
     Attributes:
         height_m: of the drop.
@@ -152,13 +149,10 @@ class Restitution(ContactScene):
     """Balls of every elasticity strike the ground at every speed, under gravity.
 
     The one scene whose contacts do follow the time step, as they do in the product
-    (`roller_env.physics.materials`): it asks how far a level's elasticity can be believed with
-    each method and step. Its error is of the *model* alone. Without gravity it would not depend on
-    the step at all, since the calibration scales with it; under gravity a slow ball falls on by
-    g h in the step that turns it round, so expect the worst at 0.2 m/s and large steps.
-
-    MuJoCo's ``discrete`` takes the contact's damper implicitly, which the product's one-step
-    contact does not reckon with (1 - B h becomes 1 / (1 + B h) > 0): it never bounces.
+    (`roller_env.physics.materials`): how far can a level's elasticity be believed? Under gravity a
+    slow ball falls on by g h in the step that turns it round, so expect the worst at 0.2 m/s and
+    large steps. MuJoCo's ``discrete`` takes the contact's damper implicitly, which the product's
+    one-step contact does not reckon with (1 - B h becomes 1 / (1 + B h) > 0): it never bounces.
     """
 
     def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
@@ -182,10 +176,8 @@ class Restitution(ContactScene):
 
 
 def calibrated(elasticity: float, method: MujocoMethod, dt_s: float) -> dict[str, Any]:
-    """Return the product's contact without friction, calibrated for a method and its step.
-
-    The product has no discrete preset; every integrator but RK4 is calibrated alike.
-    """
+    """Return the product's contact without friction, calibrated for a method and its step."""
+    # The product has no discrete preset; every integrator but RK4 is calibrated alike.
     integrator = "implicitfast" if method.integrator == "discrete" else method.integrator
     return game_contact(0.0, float(elasticity), PhysicsPreset("calibrated", dt_s, integrator))
 

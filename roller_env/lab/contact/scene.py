@@ -1,7 +1,6 @@
 """What contact scenes share: worlds and balls, the trial that is recorded and timed, the scene.
 
-``scenes.csv`` has what charts and tables say of each, its time steps, largest first, and the value
-of its first measure above which a method has failed.
+``scenes.csv`` says what charts and tables call each, and when a method has failed it.
 """
 
 from __future__ import annotations
@@ -26,8 +25,7 @@ from roller_env.physics.materials import IMPEDANCE, contact_parameters
 from roller_env.physics.presets import PRESETS, PhysicsPreset
 
 CONVERGED: Final[Mapping[str, float]] = {"iterations": 100, "tolerance": 1e-14}
-"""More iterations than any scene takes and a tolerance as small as doubles can tell, so that no
-solver error is taken for one of the integrator's."""
+"""Solver options with which no error of its own is taken for one of the integrator's."""
 
 UPWARDS: Final = ((0.0, 0.0, 1.0),)
 
@@ -35,10 +33,7 @@ UPWARDS: Final = ((0.0, 0.0, 1.0),)
 def new_spec(
     method: MujocoMethod, dt_s: float, gravity_m_s2: float = 0.0, **options: Any
 ) -> mujoco.MjSpec:
-    """Return an empty world with the method's settings, and further ones of ``mjOption``.
-
-    Flags are added to those that the method has set.
-    """
+    """Return an empty world with the method's settings, and more of ``mjOption``, flags added."""
     spec = mujoco.MjSpec()
     method.configure(spec, dt_s)
     spec.option.gravity = [0.0, 0.0, -gravity_m_s2]
@@ -93,21 +88,16 @@ def game_contact(
     elasticity: float = 0.0,
     preset: PhysicsPreset = PRESETS["default"],
 ) -> dict[str, Any]:
-    """Return a geom's contact as the product calibrates it for a preset.
-
-    The product scales it with the preset's time step. Here it stays what it is for that preset
-    however the scene is stepped.
-    """
+    """Return a geom's contact as the product calibrates it for a preset, however it is stepped."""
     parameters = contact_parameters(friction, elasticity, preset)
     return contact_of(parameters.friction, parameters.solref)
 
 
 def resting_depth(solref: Sequence[float], pull_m_s2: float) -> float:
-    """Return how deep a body rests in a contact of the game's impedance d, metres.
+    """Return how deep a body rests in a contact of the game's impedance d, m: (1 - d) pull / K.
 
-    MuJoCo's contact gives the acceleration d (-B v - K r) / d_max + (1 - d) a0 (Computation
-    chapter, "Constraint model"; in the direct form K and B are divided by d_max). At rest it is 0,
-    and a0 is minus the pull, so with constant d the depth -r is (1 - d) pull / K.
+    MuJoCo's contact gives -B v - K r + (1 - d) a0 (Computation chapter, "Constraint model"; d is
+    constant). At rest that is 0, and a0 is minus the pull.
     """
     return (1.0 - IMPEDANCE) * pull_m_s2 / -solref[0]
 
@@ -136,14 +126,10 @@ Plan = Sequence[tuple[float, Sequence[float]]]
 
 
 class MujocoTrial:
-    """One simulation of a scene: a `SteadyTrial`.
+    """One simulation of a scene: a `SteadyTrial`, with its ``model`` and ``data``.
 
     `run` writes down the path, which takes Python; `run_part` repeats the same steps in nothing
     but MuJoCo's loop. SimBenchmark, too, measures error and time in two passes.
-
-    Attributes:
-        model: what is simulated.
-        data: where it stands after the last `run` or `run_part`.
     """
 
     def __init__(
@@ -215,7 +201,7 @@ class MujocoTrial:
         return self._path
 
     def errors(self) -> Mapping[str, float]:
-        """Return the errors by the name of their measure, NaN where the simulation diverged."""
+        """Return the errors by the name of their measure, NaN where it diverged."""
         if self.path.finite:
             return self._judge(self.path)
         return {measure.name: math.nan for measure in self._scene.measures}
@@ -286,11 +272,11 @@ class BallScene(ContactScene):
     reference_step_s: float = 4e-5
 
     def places(self, path: Path) -> Float64:
-        """Return where the ball is at the scene's moments, (moments, 3) metres."""
+        """Return where the ball is at the scene's moments, (moments, 3) m."""
         return path.qpos[np.rint(np.array(self.moments_s) / path.time[1]).astype(int), :3]
 
     def away(self, path: Path, cone: Cone = "elliptic") -> Float64:
-        """Return how far the ball is from where a vanishing step takes it, (moments, 3) metres."""
+        """Return how far that is from where a vanishing step takes the ball, (moments, 3) m."""
         return self.places(path) - _converged(self, cone)
 
 

@@ -5,24 +5,18 @@ https://github.com/leggedrobotics/SimBenchmark, commit 3fd1764) compared RaiSim,
 and MuJoCo 1.50. Its set-ups and measures are used here so that MuJoCo 4's rows can stand beside
 its published ones, of which `PUBLISHED` holds those that have a counterpart.
 
-Three things about them that are not on its pages:
+Three things about them that are not on its pages: the direction called "xy" is 60 degrees from x,
+not 45. MuJoCo was left out of the bouncing test, since it has no coefficient of restitution; the
+product's calibration gives it one. And the published 666 errors of MuJoCo are not penetration: its
+first sample is taken before the positions are first computed, so all 216 balls are at the origin,
+and drop from 1.31 m with friction 0.8 where the other engines' are smooth and start on the ground.
+`DROPPED_PILE` repeats that; with the empty sample put back in, MuJoCo 4 gives the published figures
+within 0.2 % at 10 ms and 3 % at 100 ms.
 
-- The direction called "xy" is (1/2, sqrt(3)/2), 60 degrees from x, not 45.
-- MuJoCo was left out of the bouncing test, since it has no coefficient of restitution. The
-  product's calibration gives it one, so here is the missing row.
-- The published 666 errors of MuJoCo are not penetration. Its first sample is taken before the
-  positions are first computed, so all 216 balls are at the origin: 23,220 pairs of squared
-  penetration 0.04 m² and 216 of 0.01 m² with the ground are 930.96 m², which the time mean turns
-  into 93.1 m²/s times the step. Its balls also have friction 0.8 and drop from 1.31 m, where the
-  other engines' are smooth and start on the ground. `DROPPED_PILE` repeats that; with the empty
-  sample put back in, MuJoCo 4 gives the published figures within 0.2 % at 10 ms and 3 % at 100 ms.
-
-SimBenchmark's solvers for MuJoCo were PGS, CG and Newton, all with sparse matrices. Here it is CG,
-as its sparse path is right in MuJoCo 4.0.0 (Newton's Hessian is not), and dense matrices of 156
-and 1296 degrees of freedom are several times slower. Contact parameters are MuJoCo's
-defaults, as there, but in the bouncing test.
-
-What is cut, for time: steps below 1 ms (rolling, bouncing), 5 ms (666) and 10 ms (666 dropped).
+Of SimBenchmark's solvers for MuJoCo it is CG here, as its sparse path is right in MuJoCo 4.0.0
+(Newton's Hessian is not), and dense matrices of 1296 degrees of freedom are several times slower.
+Contact parameters are MuJoCo's defaults, as there, but in the bouncing test. Cut, for time: steps
+below 1 ms (rolling, bouncing), 5 ms (666) and 10 ms (666 dropped).
 """
 
 from __future__ import annotations
@@ -56,10 +50,7 @@ GRAVITY_M_S2: Final = 9.81
 PUBLISHED: Final = read_csv(File(__file__).with_suffix(".csv"))
 """SimBenchmark's data without error reduction: ``test`` (the scene here that it belongs beside),
 ``engine`` (with solver and integrator where there was a choice), ``dt_s``, ``error`` (its measure;
-infinite where the simulation blew up) and ``wall_s`` (CPU seconds of its machine of 2018).
-
-From ``data/rolling/default.csv``, ``data/bouncing/sample.csv``, ``data/666/sample.csv``.
-"""
+infinite where it blew up) and ``wall_s`` (CPU seconds of 2018). From its ``data/*/*.csv``."""
 
 
 def benchmark_spec(method: MujocoMethod, dt_s: float, friction: float) -> mujoco.MjSpec:

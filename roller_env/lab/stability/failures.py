@@ -87,7 +87,7 @@ def rows(name: str, repeats: int) -> tuple[list[dict[str, Any]], list[Curve]]:
 
     Returns:
         ``case``, ``setting``, its ``role`` (fails or cures), the ``value``, the ``verdict`` (fails
-        or holds) and whether it is ``as_expected``, ``time_ratio`` and ``evaluations_ratio`` to
+        or holds) and whether that is ``good``, ``time_ratio`` and ``evaluations_ratio`` to
         the failing setting, and the case's words; and what the quantity did where it counts.
     """
     words, (quantity, settings) = WORDS[name], FAILURES[name]()
@@ -108,7 +108,7 @@ def rows(name: str, repeats: int) -> tuple[list[dict[str, Any]], list[Curve]]:
                 "role": role,
                 "value": value,
                 "verdict": verdict,
-                "as_expected": (verdict == "fails") == (role == "fails"),
+                "good": (verdict == "fails") == (role == "fails"),
                 "time_ratio": ratio,
                 "evaluations_ratio": setting.evaluations_per_s / settings[0].evaluations_per_s,
                 **words,

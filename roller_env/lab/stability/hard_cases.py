@@ -216,8 +216,8 @@ def rows(name: str, effort: Effort) -> list[dict[str, Any]]:
     """Return a case's rows under every preset.
 
     Returns:
-        A requirement's columns, the ``preset``, its ``value``, the ``verdict`` (holds or fails)
-        and how many ``starts`` it is the worst of.
+        A requirement's columns, the ``preset``, its ``value``, the ``verdict`` (holds or fails),
+        whether that is ``good``, and how many ``starts`` it is the worst of.
     """
     found = []
     for preset in PRESETS.values():
@@ -225,7 +225,7 @@ def rows(name: str, effort: Effort) -> list[dict[str, Any]]:
         runs = [play(course, seconds) for course, seconds in starts]
         for row in REQUIREMENTS[REQUIREMENTS.case == name].to_dict("records"):
             value = float(READERS[row["quantity"]](runs))
-            verdict = "holds" if value <= row["limit"] else "fails"
-            more = {"preset": preset.name, "value": value, "verdict": verdict, "starts": len(runs)}
-            found.append(row | more)
+            good = value <= row["limit"]
+            row |= {"preset": preset.name, "value": value, "good": good, "starts": len(runs)}
+            found.append(row | {"verdict": "holds" if good else "fails"})
     return found

@@ -145,5 +145,6 @@ def judged(name: str, case: Case, effort: Effort) -> dict[str, Any]:
         "measured": measured,
         "ratio": ratio,
         "verdict": "holds" if holds else "differs",
+        "good": holds,
         "tolerance": effort.tolerance,
     }
