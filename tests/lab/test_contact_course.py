@@ -11,7 +11,6 @@ import pytest
 from roller_env.game.actions import KEY_FORCE_N
 from roller_env.lab.contact.course import (
     COURSE,
-    GAME_SCENES,
     GATE_PUSH,
     GameScene,
     played_plan,
@@ -78,7 +77,7 @@ def test_the_ball_is_pressed_against_the_gate_until_it_has_sunk() -> None:
     assert x[-1] - x[0] > 0.2
 
 
-@pytest.mark.parametrize("scene", GAME_SCENES, ids=lambda scene: scene.name)
+@pytest.mark.parametrize("scene", [GATE_PUSH, COURSE], ids=lambda scene: scene.name)
 def test_the_contacts_are_the_same_at_every_step(scene: ContactScene) -> None:
     models = [scene.trial(MujocoMethod("RK4"), dt_s).model for dt_s in (0.005, 0.001)]
     np.testing.assert_array_equal(models[0].geom_solref, models[1].geom_solref)

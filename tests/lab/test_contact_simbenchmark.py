@@ -16,13 +16,13 @@ from roller_env.lab.contact.simbenchmark import (
     PUBLISHED,
     ROLLING_XY,
     ROLLING_Y,
-    SIMBENCHMARK,
+    SCENES,
     Rolling,
     squared_penetration,
 )
 from roller_env.lab.methods import MujocoMethod
 
-SCENES = {scene.name: scene for scene in SIMBENCHMARK}
+NAMED = {scene.name: scene for scene in SCENES}
 
 
 def published(test: str, engine: str, dt_s: float) -> Any:
@@ -35,9 +35,9 @@ def published(test: str, engine: str, dt_s: float) -> Any:
 
 
 def test_every_published_row_stands_beside_a_scene() -> None:
-    assert set(PUBLISHED.test) == set(SCENES)
+    assert set(PUBLISHED.test) == set(NAMED)
     for row in PUBLISHED.itertuples():
-        assert row.dt_s in SCENES[row.test].time_steps_s
+        assert row.dt_s in NAMED[row.test].time_steps_s
 
 
 def test_the_box_and_the_balls_accelerate_as_worked_out_by_hand() -> None:

@@ -10,7 +10,7 @@ first order for every method, and after a few the ball's path is a matter of cha
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Final
@@ -22,14 +22,7 @@ from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.compile.mjcf import build_spec
 from roller_env.config import make_config
 from roller_env.game.actions import KEY_FORCE_N
-from roller_env.lab.contact.scene import (
-    CONVERGED,
-    BallScene,
-    ContactScene,
-    MujocoTrial,
-    Plan,
-    described,
-)
+from roller_env.lab.contact import scene
 from roller_env.lab.game import played
 from roller_env.lab.methods import MujocoMethod
 from roller_env.lab.simulate import Path
@@ -44,7 +37,7 @@ Keys = tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True)
-class GameScene(BallScene):
+class GameScene(scene.BallScene):
     """A shipped ``level`` that is played open loop."""
 
     level: str = "classic"
@@ -56,23 +49,23 @@ class GameScene(BallScene):
 
     @property
     @abstractmethod
-    def plan(self) -> Plan:
+    def plan(self) -> scene.Plan:
         """What the actuators do."""
 
     def start(self, data: mujoco.MjData) -> None:
         """Put the freshly reset data where the motion begins."""
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
+    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
         spec = build_spec(self.compiled.level, PRESETS["default"])
         method.configure(spec, dt_s)
-        for name, value in CONVERGED.items():
+        for name, value in scene.CONVERGED.items():
             setattr(spec.option, name, value)
 
         def judge(path: Path) -> Mapping[str, float]:
             distances = np.linalg.norm(self.away(path), axis=1).tolist()
             return dict(zip((one.name for one in self.measures), distances, strict=True))
 
-        return MujocoTrial(self, spec, judge, self.start, self.plan)
+        return scene.MujocoTrial(self, spec, judge, self.start, self.plan)
 
 
 @cache
@@ -84,7 +77,7 @@ class GatePush(GameScene):
     """A key presses the ball against the gate while the servo, of 100 times its mass, lowers it."""
 
     @property
-    def plan(self) -> Plan:
+    def plan(self) -> scene.Plan:
         """A push, half a second before the gate begins to move."""
         compiled = self.compiled
         pressing = np.zeros(compiled.model.nu)
@@ -112,13 +105,13 @@ class Course(GameScene):
     keys: Keys = ()
 
     @property
-    def plan(self) -> Plan:
+    def plan(self) -> scene.Plan:
         """What the actuators did."""
         return played_plan(self.level, self.keys)
 
 
 @cache
-def played_plan(level: str, keys: Keys) -> Plan:
+def played_plan(level: str, keys: Keys) -> scene.Plan:
     """Play keys through the product's simulation, and return what its actuators did."""
     config = make_config(
         level=load_level(level), physics="accurate", control_dt_s=CONTROL_DT_S, num_threads=1
@@ -127,14 +120,12 @@ def played_plan(level: str, keys: Keys) -> Plan:
     return tuple((CONTROL_DT_S, row) for row in ctrl.tolist())
 
 
-GATE_PUSH: Final = GatePush(**described("gate-push"), level="gate", moments_s=(3.6, 2.4, 0.4))
+GATE_PUSH: Final = GatePush(**scene.described("gate-push"), level="gate", moments_s=(3.6, 2.4, 0.4))
 COURSE: Final = Course(
-    **described("course"),
+    **scene.described("course"),
     moments_s=(3.0, 2.0, 4.0),
     # After an impact RK4, too, is of first order: this reference is good to 2e-4 m (found by
     # halving its step), one of 4e-5 s to 1e-3 m.
     reference_step_s=1e-5,
     keys=(("w", 1.5), ("wa", 0.5), ("a", 0.5), ("s", 1.5)),
 )
-
-GAME_SCENES: Final[Sequence[ContactScene]] = (GATE_PUSH, COURSE)

@@ -13,18 +13,7 @@ import mujoco
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from roller_env.lab.contact.scene import (
-    CONVERGED,
-    UPWARDS,
-    ContactScene,
-    MujocoTrial,
-    add_ball,
-    add_ground,
-    contact_of,
-    described,
-    game_contact,
-    new_spec,
-)
+from roller_env.lab.contact import scene
 from roller_env.lab.game import GRAVITY_M_S2, MASS_KG, RADIUS_M
 from roller_env.lab.methods import MujocoMethod
 from roller_env.lab.simulate import Float64, Path
@@ -36,16 +25,18 @@ def falling_balls(
     method: MujocoMethod, dt_s: float, contacts: Sequence[Mapping[str, Any]]
 ) -> mujoco.MjSpec:
     """Return balls over the ground that can only move up and down; ``qpos`` are their heights."""
-    spec = new_spec(method, dt_s, GRAVITY_M_S2, **CONVERGED)
-    add_ground(spec, condim=1, contype=0, conaffinity=1)
+    spec = scene.new_spec(method, dt_s, GRAVITY_M_S2, **scene.CONVERGED)
+    scene.add_ground(spec, condim=1, contype=0, conaffinity=1)
     for number, contact in enumerate(contacts):
         at = (2.0 * number, 0.0, RADIUS_M)
-        add_ball(spec, at, RADIUS_M, MASS_KG, UPWARDS, contype=1, conaffinity=0, **contact)
+        scene.add_ball(
+            spec, at, RADIUS_M, MASS_KG, scene.UPWARDS, contype=1, conaffinity=0, **contact
+        )
     return spec
 
 
 @dataclass(frozen=True)
-class Bounce(ContactScene):
+class Bounce(scene.ContactScene):
     """A ball dropped on a spring-damper that stays the same at every step.
 
     *Discretisation* is the distance from the contact's own law, integrated from event to event
@@ -69,7 +60,7 @@ class Bounce(ContactScene):
         ratio = damping_ratio(self.elasticity)
         return -(self.frequency_rad_s**2), -2.0 * ratio * self.frequency_rad_s
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
+    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
         def lift(data: mujoco.MjData) -> None:
             data.qpos[0] = self.height_m
 
@@ -79,8 +70,8 @@ class Bounce(ContactScene):
             errors = np.abs(path.qpos[-1, 0] - np.array((soft, rigid))) / self.height_m
             return dict(zip(("position", "rigid"), errors.tolist(), strict=True))
 
-        spec = falling_balls(method, dt_s, [contact_of(0.0, self.solref)])
-        return MujocoTrial(self, spec, judge, lift)
+        spec = falling_balls(method, dt_s, [scene.contact_of(0.0, self.solref)])
+        return scene.MujocoTrial(self, spec, judge, lift)
 
 
 def _event(
@@ -145,7 +136,7 @@ ARRIVALS: Final = (0.2, 0.5, 0.8)
 """Fractions of a step after which a ball touches the ground, on which its bounce must not depend"""
 
 
-class Restitution(ContactScene):
+class Restitution(scene.ContactScene):
     """Balls of every elasticity strike the ground at every speed, under gravity.
 
     The one scene whose contacts do follow the time step, as they do in the product
@@ -155,7 +146,7 @@ class Restitution(ContactScene):
     one-step contact does not reckon with (1 - B h becomes 1 / (1 + B h) > 0): it never bounces.
     """
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
+    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
         elasticity, speed, arrival = np.array([*product(ELASTICITIES, SPEEDS_M_S, ARRIVALS)]).T
         height = speed * dt_s * arrival
 
@@ -172,14 +163,14 @@ class Restitution(ContactScene):
             return {name: float(error[those].max()) for name, those in chosen.items()}
 
         contacts = [calibrated(one, method, dt_s) for one in elasticity]
-        return MujocoTrial(self, falling_balls(method, dt_s, contacts), judge, throw)
+        return scene.MujocoTrial(self, falling_balls(method, dt_s, contacts), judge, throw)
 
 
 def calibrated(elasticity: float, method: MujocoMethod, dt_s: float) -> dict[str, Any]:
     """Return the product's contact without friction, calibrated for a method and its step."""
     # The product has no discrete preset; every integrator but RK4 is calibrated alike.
     integrator = "implicitfast" if method.integrator == "discrete" else method.integrator
-    return game_contact(0.0, float(elasticity), PhysicsPreset("calibrated", dt_s, integrator))
+    return scene.game_contact(0.0, float(elasticity), PhysicsPreset("calibrated", dt_s, integrator))
 
 
 def returned_speed(path: Path) -> Float64:
@@ -197,7 +188,5 @@ def returned_speed(path: Path) -> Float64:
     return speed
 
 
-BOUNCE: Final = Bounce(**described("bounce"))
-RESTITUTION: Final = Restitution(**described("restitution"))
-
-IMPACTS: Final[Sequence[ContactScene]] = (BOUNCE, RESTITUTION)
+BOUNCE: Final = Bounce(**scene.described("bounce"))
+RESTITUTION: Final = Restitution(**scene.described("restitution"))

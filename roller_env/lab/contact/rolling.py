@@ -20,19 +20,7 @@ import mujoco
 import numpy as np
 
 from roller_env.game.actions import KEY_FORCE_N
-from roller_env.lab.contact.scene import (
-    CONVERGED,
-    BallScene,
-    ContactScene,
-    MujocoTrial,
-    add_ball,
-    add_ground,
-    contact_of,
-    described,
-    game_contact,
-    new_spec,
-    resting_depth,
-)
+from roller_env.lab.contact import scene
 from roller_env.lab.game import FRICTION, GRAVITY_M_S2, MASS_KG, RADIUS_M
 from roller_env.lab.methods import MUJOCO, PYRAMIDAL, Method, MujocoMethod
 from roller_env.lab.simulate import Float64, Path
@@ -57,7 +45,7 @@ at 1 % the ball would seem to roll 0.15 % too late with every method and step.""
 
 
 @dataclass(frozen=True)
-class SteadyRoll(BallScene):
+class SteadyRoll(scene.BallScene):
     """A ball that a steady force sets rolling from rest.
 
     Attributes:
@@ -76,16 +64,16 @@ class SteadyRoll(BallScene):
         pull = GRAVITY_M_S2 * math.sin(math.radians(self.slope_deg))
         return 5.0 / 7.0 * (pull + self.force_n / MASS_KG)
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
-        spec = new_spec(method, dt_s, GRAVITY_M_S2, impratio=IMPRATIO, **CONVERGED)
+    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
+        spec = scene.new_spec(method, dt_s, GRAVITY_M_S2, impratio=IMPRATIO, **scene.CONVERGED)
         angle = math.radians(self.slope_deg)
         normal = np.array([math.sin(angle), 0.0, math.cos(angle)])
         along = np.array([math.cos(angle), 0.0, -math.sin(angle)])
         tilt = [math.cos(angle / 2.0), 0.0, math.sin(angle / 2.0), 0.0]
-        add_ground(spec, quat=tilt, **contact_of(FRICTION, SOFT_SOLREF))
-        depth = resting_depth(SOFT_SOLREF, GRAVITY_M_S2 * math.cos(angle))
+        scene.add_ground(spec, quat=tilt, **scene.contact_of(FRICTION, SOFT_SOLREF))
+        depth = scene.resting_depth(SOFT_SOLREF, GRAVITY_M_S2 * math.cos(angle))
         start = (RADIUS_M - depth) * normal
-        add_ball(spec, start.tolist(), RADIUS_M, MASS_KG)
+        scene.add_ball(spec, start.tolist(), RADIUS_M, MASS_KG)
         displacement = 0.5 * self.acceleration_m_s2 * self.horizon_s**2
 
         def push(data: mujoco.MjData) -> None:
@@ -98,11 +86,11 @@ class SteadyRoll(BallScene):
                 "acceleration": abs(float(moved @ along) / displacement - 1.0),
             }
 
-        return MujocoTrial(self, spec, judge, push)
+        return scene.MujocoTrial(self, spec, judge, push)
 
 
 @dataclass(frozen=True)
-class Skid(BallScene):
+class Skid(scene.BallScene):
     """A ball that is thrown along the ground without spin, skids, and begins to roll.
 
     The ground is the game's own at its default preset: in the soft contact of the other two, the
@@ -138,12 +126,12 @@ class Skid(BallScene):
         braked = 0.5 * FRICTION * GRAVITY_M_S2 * skids**2
         return (self.speed_m_s * (skids + 5.0 / 7.0 * rolls) - braked) * self.direction
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
-        spec = new_spec(method, dt_s, GRAVITY_M_S2, impratio=IMPRATIO, **CONVERGED)
-        contact = game_contact()
-        add_ground(spec, **contact)
-        depth = resting_depth(contact["solref"], GRAVITY_M_S2)
-        add_ball(spec, (0.0, 0.0, RADIUS_M - depth), RADIUS_M, MASS_KG)
+    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
+        spec = scene.new_spec(method, dt_s, GRAVITY_M_S2, impratio=IMPRATIO, **scene.CONVERGED)
+        contact = scene.game_contact()
+        scene.add_ground(spec, **contact)
+        depth = scene.resting_depth(contact["solref"], GRAVITY_M_S2)
+        scene.add_ball(spec, (0.0, 0.0, RADIUS_M - depth), RADIUS_M, MASS_KG)
 
         def throw(data: mujoco.MjData) -> None:
             data.qvel[:2] = self.speed_m_s * self.direction
@@ -157,7 +145,7 @@ class Skid(BallScene):
                 "place": float(np.linalg.norm(path.qpos[-1, :2] - self.rigid_place_m)),
             }
 
-        return MujocoTrial(self, spec, judge, throw)
+        return scene.MujocoTrial(self, spec, judge, throw)
 
 
 def roll_time(path: Path) -> float:
@@ -185,11 +173,9 @@ def slip_speed(path: Path) -> Float64:
     return np.asarray(np.linalg.norm((path.qvel[:, :3] + np.cross(spin, contact))[:, :2], axis=1))
 
 
-INCLINE: Final = SteadyRoll(**described("incline"), slope_deg=20.0)
-PUSH: Final = SteadyRoll(**described("push"), force_n=KEY_FORCE_N)
+INCLINE: Final = SteadyRoll(**scene.described("incline"), slope_deg=20.0)
+PUSH: Final = SteadyRoll(**scene.described("push"), force_n=KEY_FORCE_N)
 SKIDS: Final = tuple(
-    Skid(**described(f"skid-{heading_deg:g}"), heading_deg=heading_deg)
+    Skid(**scene.described(f"skid-{heading_deg:g}"), heading_deg=heading_deg)
     for heading_deg in (0.0, 22.5, 45.0)
 )
-
-ROLLING: Final[Sequence[ContactScene]] = (INCLINE, PUSH, *SKIDS)

@@ -32,15 +32,8 @@ import numpy as np
 from pandas import read_csv
 from scipy.spatial.distance import pdist
 
+from roller_env.lab.contact import scene
 from roller_env.lab.contact.impact import calibrated
-from roller_env.lab.contact.scene import (
-    ContactScene,
-    MujocoTrial,
-    add_ball,
-    add_ground,
-    described,
-    new_spec,
-)
 from roller_env.lab.methods import MUJOCO, PYRAMIDAL, Method, MujocoMethod
 from roller_env.lab.simulate import Float64, Path
 
@@ -56,8 +49,8 @@ infinite where it blew up) and ``wall_s`` (CPU seconds of 2018). From its ``data
 def benchmark_spec(method: MujocoMethod, dt_s: float, friction: float) -> mujoco.MjSpec:
     """Return a ground with SimBenchmark's gravity, MuJoCo's defaults and the sparse CG."""
     solver, jacobian = mujoco.mjtSolver.mjSOL_CG, mujoco.mjtJacobian.mjJAC_SPARSE
-    spec = new_spec(method, dt_s, GRAVITY_M_S2, solver=solver, jacobian=jacobian)
-    add_ground(spec, **rubbing(friction))
+    spec = scene.new_spec(method, dt_s, GRAVITY_M_S2, solver=solver, jacobian=jacobian)
+    scene.add_ground(spec, **rubbing(friction))
     return spec
 
 
@@ -67,7 +60,7 @@ def rubbing(friction: float) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Rolling(ContactScene):
+class Rolling(scene.ContactScene):
     """A box that carries 25 balls is pushed hard enough to slide; the balls roll on it.
 
     Attributes:
@@ -95,7 +88,7 @@ class Rolling(ContactScene):
         f2 = (self.force_n - f1) / self.box_kg / (3.5 / self.ball_kg + self.balls / self.box_kg)
         return (self.force_n - f1 - self.balls * f2) / self.box_kg, f2 / self.ball_kg
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
+    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
         spec = benchmark_spec(method, dt_s, self.ground_friction)
         half_edge, half_height, overlap = 10.0, 0.5, 2e-6
         box = spec.worldbody.add_body(pos=[0.0, 0.0, half_height - overlap])
@@ -109,7 +102,7 @@ class Rolling(ContactScene):
         for x in np.arange(-4.0, 5.0, 2.0):
             for y in np.arange(-4.0, 5.0, 2.0):
                 at = (x, y, 3.0 * half_height - overlap)
-                add_ball(spec, at, half_height, self.ball_kg, **rubbing(self.ball_friction))
+                scene.add_ball(spec, at, half_height, self.ball_kg, **rubbing(self.ball_friction))
 
         def push(data: mujoco.MjData) -> None:
             data.xfrc_applied[1, :2] = self.force_n * np.array(self.direction)
@@ -117,7 +110,7 @@ class Rolling(ContactScene):
         def judge(path: Path) -> Mapping[str, float]:
             return {"velocity": self.error(path.time, path.qvel[:, :3], path.qvel[:, 6:9])}
 
-        return MujocoTrial(self, spec, judge, push, timed_s=(0.0, 0.2))
+        return scene.MujocoTrial(self, spec, judge, push, timed_s=(0.0, 0.2))
 
     def error(self, time: Float64, box: Float64, ball: Float64) -> float:
         """Return SimBenchmark's error, (m/s)²: the mean over time of both squared velocity errors.
@@ -133,7 +126,7 @@ class Rolling(ContactScene):
         return squares
 
 
-class Bouncing(ContactScene):
+class Bouncing(scene.ContactScene):
     """49 smooth balls of 10 kg drop 5 m and should bounce for ever; their energy is watched.
 
     MuJoCo gets its elasticity of 1 from the product's calibration for the method and step. What
@@ -149,17 +142,17 @@ class Bouncing(ContactScene):
     energy_j = side**2 * ball_kg * GRAVITY_M_S2 * height_m
     """Of all balls at the start, above the ground."""
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
+    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
         spec = benchmark_spec(method, dt_s, 0.0)
         contact = calibrated(1.0, method, dt_s)
         for x, y in np.ndindex(self.side, self.side):
             at = (2.0 * x, 2.0 * y, self.height_m)
-            add_ball(spec, at, self.radius_m, self.ball_kg, **contact)
+            scene.add_ball(spec, at, self.radius_m, self.ball_kg, **contact)
 
         def judge(path: Path) -> Mapping[str, float]:
             return {"energy": self.error(path.qpos[:, 2::7], path.qvel.reshape(-1, 49, 6))}
 
-        return MujocoTrial(self, spec, judge, timed_s=(0.0, 2.0))
+        return scene.MujocoTrial(self, spec, judge, timed_s=(0.0, 2.0))
 
     def error(self, height: Float64, velocity: Float64) -> float:
         """Return SimBenchmark's error, J²: the mean over time of the squared error of the energy.
@@ -175,7 +168,7 @@ class Bouncing(ContactScene):
 
 
 @dataclass(frozen=True)
-class SixSixSix(ContactScene):
+class SixSixSix(scene.ContactScene):
     """A cube of 6 x 6 x 6 balls, a little disturbed, collapses; how deep do they overlap?
 
     Attributes:
@@ -198,7 +191,7 @@ class SixSixSix(ContactScene):
         """Squared overlap of all balls at the origin, which SimBenchmark's first sample shows."""
         return squared_penetration(np.zeros((self.side**3, 3)), self.radius_m)
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
+    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
         spec = benchmark_spec(method, dt_s, self.friction)
         # Deep piles have many contacts at large steps.
         spec.memory = 2**28
@@ -208,7 +201,7 @@ class SixSixSix(ContactScene):
         contact = rubbing(self.friction) | {"solimp": [0.9, 0.9, 0.01, 0.5, 2.0]}
         for place in np.ndindex(self.side, self.side, self.side):
             at = self.gap_m * np.array(place) + self.disturbance_m * random.random(3) + lowest
-            add_ball(spec, at, self.radius_m, self.ball_kg, **contact)
+            scene.add_ball(spec, at, self.radius_m, self.ball_kg, **contact)
 
         def judge(path: Path) -> Mapping[str, float]:
             places = path.qpos.reshape(len(path.qpos), -1, 7)[:-1, :, :3]
@@ -217,7 +210,7 @@ class SixSixSix(ContactScene):
             return {"penetration": float(squares.mean()), "as_published": float(published.mean())}
 
         # Timed while the pile falls apart.
-        return MujocoTrial(self, spec, judge, timed_s=(1.0, 1.5))
+        return scene.MujocoTrial(self, spec, judge, timed_s=(1.0, 1.5))
 
 
 def squared_penetration(centres: Float64, radius_m: float) -> float:
@@ -227,15 +220,15 @@ def squared_penetration(centres: Float64, radius_m: float) -> float:
     return float((balls**2).sum() + (ground**2).sum())
 
 
-ROLLING_Y: Final = Rolling(**described("rolling-y"))
-ROLLING_XY: Final = Rolling(**described("rolling-xy"), direction=(0.5, math.sqrt(0.75)))
-BOUNCING: Final = Bouncing(**described("bouncing"))
-PILE: Final = SixSixSix(**described("666"))
+ROLLING_Y: Final = Rolling(**scene.described("rolling-y"))
+ROLLING_XY: Final = Rolling(**scene.described("rolling-xy"), direction=(0.5, math.sqrt(0.75)))
+BOUNCING: Final = Bouncing(**scene.described("bouncing"))
+PILE: Final = SixSixSix(**scene.described("666"))
 DROPPED_PILE: Final = SixSixSix(
-    **described("666-dropped"),
+    **scene.described("666-dropped"),
     methods=(MujocoMethod("Euler"), MujocoMethod("RK4")),
     lowest_m=1.311,
     friction=0.8,
 )
 
-SIMBENCHMARK: Final[Sequence[ContactScene]] = (ROLLING_Y, ROLLING_XY, BOUNCING, PILE, DROPPED_PILE)
+SCENES: Final = (ROLLING_Y, ROLLING_XY, BOUNCING, PILE, DROPPED_PILE)

@@ -89,9 +89,6 @@ def thrown(height_m: float, speed_m_s: float = 0.0) -> Start:
     return start
 
 
-# Impacts -------------------------------------------------------------------------------------
-
-
 def impact(
     method: MujocoMethod, dt_s: float, ratio: float = 1.0, phase: float = 0.5
 ) -> tuple[float, float]:
@@ -145,9 +142,6 @@ def _bounce(method: MujocoMethod, dt_s: float, effort: Effort) -> float:
     return float(np.median(ratios))
 
 
-# Walls ---------------------------------------------------------------------------------------
-
-
 def tunnelling_speed(dt_s: float) -> float:
     """Return the speed at which the ball's centre reaches the middle of the wall.
 
@@ -182,8 +176,6 @@ def _touching(_effort: Effort) -> float:
     # Binary fractions, so that the floating-point way to the wall is exact.
     return math.inf if _stopped(1 / 512, SPECULATIVE, 256.0, 0.0) else 256.0
 
-
-# Friction ------------------------------------------------------------------------------------
 
 MU: Final = 0.5
 SLIP_M_S: Final = 0.03
@@ -226,9 +218,6 @@ def _heading(method: MujocoMethod, _effort: Effort) -> float:
 
 def _hold(method: MujocoMethod, impratio: float, _effort: Effort) -> float:
     return abs(slide(method, 45.0, 2.0, push=0.9, impratio=impratio))
-
-
-# Contacts that last --------------------------------------------------------------------------
 
 
 def _mocap(method: MujocoMethod, dt_s: float, tau_s: float, _effort: Effort) -> float:
@@ -289,8 +278,6 @@ def _seam(dt_s: float, effort: Effort) -> float:
     return float(np.median(bumps))
 
 
-# Hops ----------------------------------------------------------------------------------------
-
 HOP_M_S: Final = 4.0
 
 
@@ -339,9 +326,6 @@ def _hop(dt_s: float, share: float | None, _effort: Effort) -> float:
     data.qvel[0] = HOP_M_S
     mujoco.mj_step(model, data)
     return float(data.qvel[2])
-
-
-# All of them ---------------------------------------------------------------------------------
 
 
 def _impact_cases() -> Iterator[tuple[str, Case]]:

@@ -117,9 +117,6 @@ def rows(name: str, repeats: int) -> tuple[list[dict[str, Any]], list[Curve]]:
     return found, curves
 
 
-# The scenes ----------------------------------------------------------------------------------
-
-
 def seam_level(*, seams: bool) -> Level:
     """Return a lane of tiles of 64 quants, which two materials keep the compiler from merging."""
     edge, count = quants(64.0), 60
@@ -174,9 +171,6 @@ def _unlimited(compiled: CompiledLevel) -> CompiledLevel:
     """Let a level's servos pull as hard as they like; changes its model."""
     compiled.model.actuator_forcelimited[:] = 0
     return compiled
-
-
-# The failures --------------------------------------------------------------------------------
 
 
 def blow_up() -> Failure:

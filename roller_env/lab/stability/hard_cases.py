@@ -17,19 +17,8 @@ from pandas import read_csv
 
 from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.game.actions import KEY_FORCE_N
-from roller_env.lab.game import (
-    DECK_M,
-    GATE_SPEED_M_S,
-    GRAVITY_M_S2,
-    GROUND,
-    PLATE_SPEED_M_S,
-    RADIUS_M,
-    TUBE_FALL_M,
-    Course,
-    Run,
-    make_level,
-    play,
-)
+from roller_env.lab import game
+from roller_env.lab.game import GATE_SPEED_M_S, RADIUS_M, Course, Run
 from roller_env.lab.stability.failures import gate_level, hanging_gate_level, seam_level
 from roller_env.lab.stability.limits import Effort
 from roller_env.level import load_level
@@ -47,9 +36,6 @@ HOP_SPEEDS_M_S: Final = (1.0, 2.0, 4.0, 8.0)
 
 Starts = Iterator[tuple[Course, float]]
 """Courses, and how many seconds each is simulated."""
-
-
-# The cases -----------------------------------------------------------------------------------
 
 
 def gate_closing_on_the_ball(preset: PhysicsPreset, starts: int) -> Starts:
@@ -98,16 +84,16 @@ def plate_sinking_under_the_ball(preset: PhysicsPreset, starts: int) -> Starts:
     top = np.add(plate.at, (0.0, 0.0, plate.size[2] / 2 + RADIUS_M + 0.001))
     corner = np.array([plate.size[0] / 2, plate.size[1] / 2, 0.0])
     for share in np.linspace(0.0, 1.0, starts):
-        yield Course(compiled, tuple(top + share * corner), movers_m_s=-PLATE_SPEED_M_S), 4.0
+        yield Course(compiled, tuple(top + share * corner), movers_m_s=-game.PLATE_SPEED_M_S), 4.0
 
 
 def landing_from_the_tube(preset: PhysicsPreset, starts: int) -> Starts:
     """Let the ball fall 46.9 m onto a deck of 16 quants."""
-    deck = {"at": (0.0, 0.0, -DECK_M / 2), "size": (50.0, 50.0, DECK_M)}
-    level = make_level(boxes=[deck], start={"at": (0.0, 0.0, RADIUS_M)})
+    deck = {"at": (0.0, 0.0, -game.DECK_M / 2), "size": (50.0, 50.0, game.DECK_M)}
+    level = game.make_level(boxes=[deck], start={"at": (0.0, 0.0, RADIUS_M)})
     compiled = compile_level(level, preset)
     for more in np.linspace(0.0, 0.3, starts):
-        yield Course(compiled, (0.0, 0.0, RADIUS_M + TUBE_FALL_M + more)), 4.0
+        yield Course(compiled, (0.0, 0.0, RADIUS_M + game.TUBE_FALL_M + more)), 4.0
 
 
 def _rolling(compiled: CompiledLevel, x: float, height: float, speed: float) -> Course:
@@ -136,7 +122,7 @@ def lane_of_seams(preset: PhysicsPreset, starts: int) -> Starts:
 def box_corner_at_full_speed(preset: PhysicsPreset, starts: int) -> Starts:
     """Throw the ball at 15 m/s by turns along the ground at an edge and from above at a corner."""
     box = {"at": (0.0, 0.0, 1.0), "size": (2.0, 2.0, 2.0)}
-    compiled = compile_level(make_level(boxes=[dict(GROUND), box]), preset)
+    compiled = compile_level(game.make_level(boxes=[dict(game.GROUND), box]), preset)
     for index, angle in enumerate(np.radians(np.linspace(0.0, 90.0, starts))):
         falls = index % 2 == 1
         way = np.array([math.cos(angle), math.sin(angle), 1.5 if falls else 0.0])
@@ -147,14 +133,14 @@ def box_corner_at_full_speed(preset: PhysicsPreset, starts: int) -> Starts:
 
 def skidding(preset: PhysicsPreset, _starts: int) -> Starts:
     """Let the ball slide without spin; it hops while friction spins it."""
-    compiled = compile_level(make_level(), preset)
+    compiled = compile_level(game.make_level(), preset)
     for speed in HOP_SPEEDS_M_S:
         yield Course(compiled, (0.0, 0.0, RADIUS_M), velocity=(speed, 0.0, 0.0)), 1.0
 
 
 def spinning_on_the_spot(preset: PhysicsPreset, _starts: int) -> Starts:
     """Spin the ball about the vertical at 20 rad/s for 10 s."""
-    compiled = compile_level(make_level(), preset)
+    compiled = compile_level(game.make_level(), preset)
     yield Course(compiled, (0.0, 0.0, RADIUS_M), spin=(0.0, 0.0, 20.0)), 10.0
 
 
@@ -177,9 +163,6 @@ HARD_CASES: Final[dict[str, Callable[[PhysicsPreset, int], Starts]]] = {
 """Each case's simulations, from so many starts; by name."""
 
 
-# What is read off ----------------------------------------------------------------------------
-
-
 def _bump_mm(run: Run) -> float:
     # What the ball sinks into the floor at the start is no bump.
     height = run.position[len(run.position) // 4 :, 2]
@@ -195,7 +178,7 @@ def _wrong_roll_percent(runs: Sequence[Run]) -> float:
 READERS: Final[dict[str, Callable[[Sequence[Run]], float]]] = {
     "deepest contact, mm": lambda runs: 1e3 * max(run.depth.max() for run in runs),
     "energy gained, as height, mm": lambda runs: (
-        1e3 * max(np.nanmax(run.energy) - run.energy[0] for run in runs) / GRAVITY_M_S2
+        1e3 * max(np.nanmax(run.energy) - run.energy[0] for run in runs) / game.GRAVITY_M_S2
     ),
     "starts that diverge": lambda runs: sum(not run.finite for run in runs),
     "greatest speed, m/s": lambda runs: max(np.nanmax(run.speed) for run in runs),
@@ -222,7 +205,7 @@ def rows(name: str, effort: Effort) -> list[dict[str, Any]]:
     found = []
     for preset in PRESETS.values():
         starts = HARD_CASES[name](preset, effort.starts)
-        runs = [play(course, seconds) for course, seconds in starts]
+        runs = [game.play(course, seconds) for course, seconds in starts]
         for row in REQUIREMENTS[REQUIREMENTS.case == name].to_dict("records"):
             value = float(READERS[row["quantity"]](runs))
             good = value <= row["limit"]

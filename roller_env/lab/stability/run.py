@@ -90,9 +90,6 @@ def write(results: Results, facts: Mapping[str, str], directory: Path) -> list[P
     return written
 
 
-# Tables --------------------------------------------------------------------------------------
-
-
 def page(section: str, table: Frame) -> str:
     """Return a section's table as Markdown, with the notes below."""
     shown = {"limits": _limits, "failures": _failures, "hard_cases": _hard_cases}[section](table)
@@ -142,9 +139,6 @@ def _hard_cases(table: Frame) -> Frame:
     wide = table.assign(said=said.where(table.good, "**" + said + "**"))
     wide = wide.set_index([*keys, "preset"]).said.unstack(sort=False).reset_index()
     return wide[[*keys[:2], *table.preset.unique(), *keys[2:]]]
-
-
-# Pictures ------------------------------------------------------------------------------------
 
 
 def draw_failure(rows: Frame, curves: Sequence[failures.Curve]) -> Figure:
