@@ -9,7 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roller_env.lab.stability.contacts import CONTACTS, TAU_S, worst_return
-from roller_env.lab.stability.limits import EXACT, FULL, QUICK, WORDS, Case, judged, locate
+from roller_env.lab.stability.limits import (
+    EXACT,
+    FULL,
+    QUICK,
+    WORDS,
+    Limit,
+    Quantity,
+    judged,
+    locate,
+)
 from roller_env.lab.stability.run import CASES
 from roller_env.lab.stability.smooth import (
     SMOOTH,
@@ -112,14 +121,14 @@ def test_where_no_limit_is_expected_the_first_failure_is_the_limit(threshold: fl
         tried.append(value)
         return value < threshold
 
-    assert Case(math.inf, holds=holds).measure(QUICK, searched_to=100.0) == tried[-1] >= threshold
+    assert Limit(math.inf, holds).measure(QUICK, searched_to=100.0) == tried[-1] >= threshold
     assert tried == sorted(tried)
     assert tried[0] == 0.5
     assert tried[-1] / 1.1 < threshold or threshold == 0.5
 
 
 def test_what_never_fails_has_an_infinite_limit() -> None:
-    assert Case(math.inf, holds=lambda _effort, _value: True).measure(QUICK, 2.0) == math.inf
+    assert Limit(math.inf, lambda _effort, _value: True).measure(QUICK, 2.0) == math.inf
 
 
 @pytest.mark.parametrize(
@@ -146,7 +155,7 @@ def test_a_wrong_prediction_is_found_to_be_wrong(
     predicted: float, measured: float, verdict: str
 ) -> None:
     """The harness itself can say no: the measured value a tenth off, and a limit where none is."""
-    row = judged("servo_rk4_1", Case(predicted, value=lambda _effort: measured), QUICK)
+    row = judged("servo_rk4_1", Quantity(predicted, lambda _effort: measured), QUICK)
     assert row["verdict"] == verdict
     if math.isfinite(predicted):
         assert row["ratio"] == pytest.approx(measured / predicted, nan_ok=True)

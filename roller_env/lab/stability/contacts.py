@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any, Final
@@ -17,13 +17,13 @@ from roller_env.lab import game
 from roller_env.lab.contact.scene import UPWARDS, add_ball, contact_of, new_spec
 from roller_env.lab.methods import MujocoMethod
 from roller_env.lab.simulate import Start, record, settled, started, stays
-from roller_env.lab.stability.limits import Case, Effort
+from roller_env.lab.stability.limits import Case, Effort, Limit, Quantity
 from roller_env.lab.stability.smooth import (
     DISCRETE,
     EULER,
     IMPLICITFAST,
     RK4,
-    explicit_damping_limit,
+    damping_limit,
     rk4_servo_limit,
 )
 from roller_env.physics.materials import DAMPING_STEPS
@@ -181,6 +181,10 @@ MU: Final = 0.5
 SLIP_M_S: Final = 0.03
 """Speed after 4 s that is called slipping: it takes 0.15 % more than the friction."""
 
+SLID_M_S: Final = (0.9 - math.sqrt(0.5)) * MU * GRAVITY * 2.0
+BENT_DEG: Final = math.degrees(
+    math.atan2(2.0 * math.sin(math.pi / 8), 2.0 * math.cos(math.pi / 8) - MU * GRAVITY * 0.2)
+)
 CREEP_M_S: Final = (1.0 - IMPEDANCE) / IMPEDANCE * 0.9 * MU * GRAVITY * IMPEDANCE * TAU_S / 2.0
 """Under 0.9 of the friction, which is a damper b = 2 / (d tau) of the acceleration, made soft by
 (1 - d) / d / impratio."""
@@ -328,91 +332,74 @@ def _hop(dt_s: float, share: float | None, _effort: Effort) -> float:
     return float(data.qvel[2])
 
 
-def _impact_cases() -> Iterator[tuple[str, Case]]:
-    for method in (EULER, IMPLICITFAST, RK4, DISCRETE):
-        key = method.integrator.lower()
-        yield f"penetration_{key}", Case(TAU_S / math.e, value=partial(_penetration, method))
-        yield f"restitution_{key}", Case(math.exp(-2.0), value=partial(_restitution, method))
-    for rate, ratio in ((120, 0.1), (120, 0.2), (240, 0.1), (960, 0.1)):
-        predicted = worst_return(1 / rate / (TAU_S * ratio), ratio)
-        value = partial(_return, 1 / rate, ratio)
-        yield f"return_{rate}hz_ratio_{ratio:g}", Case(predicted, value=value)
-    for method, *steps in ((EULER, 0.004, 0.001, 0.00025), (RK4, 0.004, 0.001), (DISCRETE, 0.001)):
-        for dt_s in steps:
-            name = f"bounce_{method.integrator.lower()}_{1e3 * dt_s:g}ms"
-            yield name, Case(1.0, value=partial(_bounce, method, dt_s))
-    for dt_s in (0.0005, COARSE_S, 0.01, 0.02):
-        holds = partial(_wall, dt_s, 0)
-        yield f"tunnelling_{1e3 * dt_s:g}ms", Case(tunnelling_speed(dt_s), None, holds, 1e-3)
-    for dt_s in (0.0005, COARSE_S, 0.005):
-        predicted = tunnelling_speed(dt_s) if dt_s < 0.001 else math.inf
-        holds = partial(_wall, dt_s, SPECULATIVE)
-        yield f"speculative_{1e3 * dt_s:g}ms", Case(predicted, None, holds, 1e-3)
-    rate_hz = tunnelling_speed(FINE_S) / (WALL_M / 2)
-    yield "speculative_needs_large_steps", Case(rate_hz, holds=_sweep, tolerance=5e-3)
-    yield "speculative_exactly_touching", Case(math.inf, value=_touching)
+_PYRAMIDAL: Final = MujocoMethod("Euler", "pyramidal")
+_IMPACTS: Final = {"euler": EULER, "implicitfast": IMPLICITFAST, "rk4": RK4, "discrete": DISCRETE}
 
-
-def _lasting_cases() -> Iterator[tuple[str, Case]]:
-    for method, predicted in (
-        (EULER, 2.0 * TAU_S),
-        (IMPLICITFAST, 2.0 * TAU_S),
-        (DISCRETE, 2.0 * TAU_S + COARSE_S),
-    ):
-        value = partial(_mocap, method, COARSE_S, TAU_S)
-        yield f"mocap_{method.integrator.lower()}", Case(predicted, value=value)
-    for dt_s in (0.008, 0.004):
-        value = partial(_mocap, EULER, dt_s, 0.005)
-        yield f"refsafe_{1e3 * dt_s:g}ms", Case(4.0 * dt_s, value=value)
-    for method, limit in (
-        (EULER, explicit_damping_limit),
-        (IMPLICITFAST, explicit_damping_limit),
-        (RK4, rk4_servo_limit),
-    ):
-        holds = partial(_resting, method)
-        yield f"resting_{method.integrator.lower()}", Case(limit(1.0), holds=holds)
-    for ratio, tau_s in ((1.0, TAU_S), (1000.0, TAU_S), (1000.0, TAU_S / 10)):
-        predicted = 2.0 * (1.0 - IMPEDANCE) * (1.0 + ratio) * GRAVITY * tau_s**2
-        value = partial(_crush, ratio, tau_s)
-        yield f"crush_1_to_{ratio:g}_tau_{1e3 * tau_s:g}ms", Case(predicted, value=value)
-
-
-def _rolling_cases() -> Iterator[tuple[str, Case]]:
-    for dt_s in (0.00002, COARSE_S):
-        case = Case(2.0 * REST_M / math.e, value=partial(_seam, dt_s))
-        yield f"seam_bump_{1e3 * dt_s:g}ms", case
-    for rate in (120, 240, 960):
-        predicted = hop_speed(1 / rate, DAMPING_STEPS)
-        yield f"hop_{rate}hz", Case(predicted, value=partial(_hop, 1 / rate, None))
-    for share in (0.5, 0.3):
-        predicted = hop_speed(1 / 240, share)
-        yield f"hop_friction_{share:g}", Case(predicted, value=partial(_hop, 1 / 240, share))
-
-
-def _friction_cases() -> Iterator[tuple[str, Case]]:
-    elliptic, pyramidal = EULER, MujocoMethod("Euler", "pyramidal")
-    across, angle = math.sqrt(0.5), math.radians(22.5)
-    bent = math.atan2(2.0 * math.sin(angle), 2.0 * math.cos(angle) - MU * GRAVITY * 0.2)
-    for method, angle_deg, predicted in (
-        (elliptic, 0.0, 1.0),
-        (elliptic, 45.0, 1.0),
-        (pyramidal, 0.0, 1.0),
-        (pyramidal, 45.0, across),
-    ):
-        holds = partial(_friction, method, angle_deg)
-        yield f"friction_{method.cone}_{angle_deg:g}deg", Case(predicted, holds=holds)
-    for method, predicted in ((elliptic, 22.5), (pyramidal, math.degrees(bent))):
-        yield f"heading_{method.cone}", Case(predicted, value=partial(_heading, method))
-    for method, impratio, predicted in (
-        (elliptic, 1.0, CREEP_M_S),
-        (elliptic, 10.0, CREEP_M_S / 10.0),
-        (pyramidal, 1.0, (0.9 - across) * MU * GRAVITY * 2.0),
-    ):
-        value = partial(_hold, method, impratio)
-        yield f"hold_{method.cone}_impratio_{impratio:g}", Case(predicted, value=value)
-
-
-CONTACTS: Final[Mapping[str, Case]] = dict(
-    (*_impact_cases(), *_friction_cases(), *_lasting_cases(), *_rolling_cases())
-)
+CONTACTS: Final[Mapping[str, Case]] = {
+    **{
+        f"penetration_{key}": Quantity(TAU_S / math.e, partial(_penetration, method))
+        for key, method in _IMPACTS.items()
+    },
+    **{
+        f"restitution_{key}": Quantity(math.exp(-2.0), partial(_restitution, method))
+        for key, method in _IMPACTS.items()
+    },
+    **{
+        f"return_{rate}hz_ratio_{ratio:g}": Quantity(
+            worst_return(1 / rate / (TAU_S * ratio), ratio), partial(_return, 1 / rate, ratio)
+        )
+        for rate, ratio in ((120, 0.1), (120, 0.2), (240, 0.1), (960, 0.1))
+    },
+    "bounce_euler_4ms": Quantity(1.0, partial(_bounce, EULER, 0.004)),
+    "bounce_euler_1ms": Quantity(1.0, partial(_bounce, EULER, 0.001)),
+    "bounce_euler_0.25ms": Quantity(1.0, partial(_bounce, EULER, 0.00025)),
+    "bounce_rk4_4ms": Quantity(1.0, partial(_bounce, RK4, 0.004)),
+    "bounce_rk4_1ms": Quantity(1.0, partial(_bounce, RK4, 0.001)),
+    "bounce_discrete_1ms": Quantity(1.0, partial(_bounce, DISCRETE, 0.001)),
+    **{
+        f"tunnelling_{1e3 * dt_s:g}ms": Limit(tunnelling_speed(dt_s), partial(_wall, dt_s, 0), 1e-3)
+        for dt_s in (0.0005, COARSE_S, 0.01, 0.02)
+    },
+    "speculative_0.5ms": Limit(tunnelling_speed(5e-4), partial(_wall, 5e-4, SPECULATIVE), 1e-3),
+    "speculative_2ms": Limit(math.inf, partial(_wall, COARSE_S, SPECULATIVE)),
+    "speculative_5ms": Limit(math.inf, partial(_wall, 0.005, SPECULATIVE)),
+    "speculative_needs_large_steps": Limit(tunnelling_speed(FINE_S) / (WALL_M / 2), _sweep, 5e-3),
+    "speculative_exactly_touching": Quantity(math.inf, _touching),
+    "friction_elliptic_0deg": Limit(1.0, partial(_friction, EULER, 0.0)),
+    "friction_elliptic_45deg": Limit(1.0, partial(_friction, EULER, 45.0)),
+    "friction_pyramidal_0deg": Limit(1.0, partial(_friction, _PYRAMIDAL, 0.0)),
+    "friction_pyramidal_45deg": Limit(math.sqrt(0.5), partial(_friction, _PYRAMIDAL, 45.0)),
+    "heading_elliptic": Quantity(22.5, partial(_heading, EULER)),
+    "heading_pyramidal": Quantity(BENT_DEG, partial(_heading, _PYRAMIDAL)),
+    "hold_elliptic_impratio_1": Quantity(CREEP_M_S, partial(_hold, EULER, 1.0)),
+    "hold_elliptic_impratio_10": Quantity(CREEP_M_S / 10.0, partial(_hold, EULER, 10.0)),
+    "hold_pyramidal_impratio_1": Quantity(SLID_M_S, partial(_hold, _PYRAMIDAL, 1.0)),
+    "mocap_euler": Quantity(2.0 * TAU_S, partial(_mocap, EULER, COARSE_S, TAU_S)),
+    "mocap_implicitfast": Quantity(2.0 * TAU_S, partial(_mocap, IMPLICITFAST, COARSE_S, TAU_S)),
+    "mocap_discrete": Quantity(2.0 * TAU_S + COARSE_S, partial(_mocap, DISCRETE, COARSE_S, TAU_S)),
+    "refsafe_8ms": Quantity(4.0 * 0.008, partial(_mocap, EULER, 0.008, 0.005)),
+    "refsafe_4ms": Quantity(4.0 * 0.004, partial(_mocap, EULER, 0.004, 0.005)),
+    "resting_euler": Limit(damping_limit(1.0), partial(_resting, EULER)),
+    "resting_implicitfast": Limit(damping_limit(1.0), partial(_resting, IMPLICITFAST)),
+    "resting_rk4": Limit(rk4_servo_limit(1.0), partial(_resting, RK4)),
+    **{
+        f"crush_1_to_{ratio:g}_tau_{1e3 * tau_s:g}ms": Quantity(
+            2.0 * (1.0 - IMPEDANCE) * (1.0 + ratio) * GRAVITY * tau_s**2,
+            partial(_crush, ratio, tau_s),
+        )
+        for ratio, tau_s in ((1.0, TAU_S), (1000.0, TAU_S), (1000.0, TAU_S / 10))
+    },
+    "seam_bump_0.02ms": Quantity(2.0 * REST_M / math.e, partial(_seam, 0.00002)),
+    "seam_bump_2ms": Quantity(2.0 * REST_M / math.e, partial(_seam, COARSE_S)),
+    **{
+        f"hop_{rate}hz": Quantity(hop_speed(1 / rate, DAMPING_STEPS), partial(_hop, 1 / rate, None))
+        for rate in (120, 240, 960)
+    },
+    **{
+        f"hop_friction_{share:g}": Quantity(
+            hop_speed(1 / 240, share), partial(_hop, 1 / 240, share)
+        )
+        for share in (0.5, 0.3)
+    },
+}
 """By name."""

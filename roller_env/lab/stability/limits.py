@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from pandas import read_csv
@@ -24,16 +23,12 @@ def words(table: str, **missing: float) -> dict[str, dict[str, Any]]:
 
 
 WORDS: Final = words("limits", searched_to=math.inf)
-"""Of every limit.
-
-``group``: what it is about, a name on the command line too. ``quantity``: what is predicted, with
-its unit. ``method``: what moves the bodies, and its setting. ``formula``: the prediction as people
-write it, h being the time step, tau ``solref[0]``, d the impedance, z a damping ratio. ``source``:
-where the formula comes from. ``criterion``: how one run is judged, or how the quantity is read off.
-``low`` and ``high``: the allowed measured / predicted. ``searched_to``: the largest value tried,
-where none is expected to fail. ``quick``: whether ``--quick`` runs it too. ``note``: why a band is
-wider than `EXACT`, or why the measured value is not the predicted one.
-"""
+"""Of every limit its ``group`` and the ``quantity`` predicted; the ``method`` that moves the
+bodies; the ``formula`` as people write it (h is the time step, tau ``solref[0]``, d the impedance,
+z a damping ratio) and its ``source``; the ``criterion`` by which a run is judged; the allowed
+measured / predicted, ``low`` to ``high``; the largest value ``searched_to`` where none is expected
+to fail; whether ``--quick`` runs it too; and a ``note`` where a band is wider than `EXACT`, or the
+measured value is not the predicted one."""
 
 EXACT: Final = (0.99, 1.01)
 """Band of measured / predicted where the formula is exact."""
@@ -75,50 +70,43 @@ def locate(holds: Callable[[float], bool], guess: float, tolerance: float) -> fl
     return math.sqrt(low * high)
 
 
-@dataclass(frozen=True, slots=True)
-class Effort:
-    """How hard a measurement tries.
+class Effort(NamedTuple):
+    """How hard a measurement tries."""
 
-    Attributes:
-        tolerance: relative width of the bracket at which bisection stops.
-        steps: steps of a smooth motion after which growth is judged.
-        phases: moments within a step at which a ball arrives.
-        starts: of each of the game's hard cases.
-        repeats: interleaved runs of which the median time is taken.
-    """
-
-    tolerance: float
-    steps: int
-    phases: int
-    starts: int
-    repeats: int
+    tolerance: float  # Relative width of the bracket at which bisection stops.
+    steps: int  # Of a smooth motion, after which growth is judged.
+    phases: int  # Moments within a step at which a ball arrives.
+    starts: int  # Of each of the game's hard cases.
+    repeats: int  # Interleaved runs of which the median time is taken.
 
 
 FULL: Final = Effort(tolerance=1e-4, steps=20_000, phases=32, starts=12, repeats=9)
 QUICK: Final = Effort(tolerance=2e-3, steps=6_000, phases=8, starts=2, repeats=1)
 
 
-@dataclass(frozen=True, slots=True)
-class Case:
-    """A prediction and how to measure it: one of ``value`` and ``holds``.
+class Quantity(NamedTuple):
+    """A quantity that is predicted, and what measures it; both infinite where nothing fails."""
 
-    Attributes:
-        predicted: infinite where no limit is expected.
-        value: measures a quantity; infinite where nothing failed.
-        holds: whether all is well at a value: a limit, which is searched for.
-        tolerance: of the bisection, where that of the effort would take too long.
+    predicted: float
+    value: Callable[[Effort], float]
+
+    def measure(self, effort: Effort, _searched_to: float) -> float:
+        """Return the quantity."""
+        return self.value(effort)
+
+
+class Limit(NamedTuple):
+    """A limit that is predicted, infinite where none is expected, and what says if all is well.
+
+    ``tolerance`` is of the bisection, where that of the effort would take too long.
     """
 
     predicted: float
-    value: Callable[[Effort], float] | None = None
-    holds: Callable[[Effort, float], bool] | None = None
+    holds: Callable[[Effort, float], bool]
     tolerance: float = 0.0
 
     def measure(self, effort: Effort, searched_to: float) -> float:
-        """Return the quantity, or the limit: infinite where nothing fails."""
-        if self.value is not None:
-            return self.value(effort)
-        assert self.holds is not None
+        """Return the value at which it begins to fail, or infinity."""
         holds = partial(self.holds, effort)
         if math.isfinite(self.predicted):
             return locate(holds, self.predicted, max(effort.tolerance, self.tolerance))
@@ -126,25 +114,17 @@ class Case:
         return next((value for value in values if not holds(value)), math.inf)
 
 
-def judged(name: str, case: Case, effort: Effort) -> dict[str, Any]:
-    """Measure a case and hold it against its prediction.
+Case = Quantity | Limit
 
-    Returns:
-        A row of the table: the case's `WORDS`, what was ``predicted`` and ``measured``, the
-        ``ratio`` of the two, and the ``verdict``: holds or differs.
+
+def judged(name: str, case: Case, effort: Effort) -> dict[str, Any]:
+    """Measure a case and return a row: its `WORDS`, ``predicted``, ``measured``, their ``ratio``.
+
+    And the ``verdict`` (holds or differs), and whether that is ``good``.
     """
-    words = WORDS[name]
-    measured = case.measure(effort, words["searched_to"])
+    row = WORDS[name] | {"case": name, "predicted": case.predicted, "tolerance": effort.tolerance}
+    row["measured"] = measured = case.measure(effort, row["searched_to"])
     limited = math.isfinite(case.predicted)
-    ratio = measured / case.predicted if limited else math.nan
-    holds = words["low"] <= ratio <= words["high"] if limited else math.isinf(measured)
-    return {
-        "case": name,
-        **words,
-        "predicted": case.predicted,
-        "measured": measured,
-        "ratio": ratio,
-        "verdict": "holds" if holds else "differs",
-        "good": holds,
-        "tolerance": effort.tolerance,
-    }
+    row["ratio"] = ratio = measured / case.predicted if limited else math.nan
+    row["good"] = row["low"] <= ratio <= row["high"] if limited else math.isinf(measured)
+    return row | {"verdict": "holds" if row["good"] else "differs"}

@@ -13,9 +13,9 @@ from numpy.polynomial import Polynomial
 from scipy.optimize import brentq
 
 from roller_env.lab.contact.scene import UPWARDS, add_ball, new_spec
-from roller_env.lab.methods import MujocoMethod
+from roller_env.lab.methods import MUJOCO, MujocoMethod
 from roller_env.lab.simulate import stays
-from roller_env.lab.stability.limits import Case, Effort
+from roller_env.lab.stability.limits import Case, Effort, Limit, Quantity
 from roller_env.rigid_body import (
     INTEGRATORS,
     Body,
@@ -28,10 +28,7 @@ from roller_env.rigid_body import (
 )
 from roller_env.rigid_body.integrators import RungeKutta4, Splitting
 
-EULER: Final = MujocoMethod("Euler")
-IMPLICITFAST: Final = MujocoMethod("implicitfast")
-RK4: Final = MujocoMethod("RK4")
-DISCRETE: Final = MujocoMethod("discrete")
+EULER, _, IMPLICITFAST, DISCRETE, RK4 = MUJOCO
 
 DT_S: Final = 0.01
 SMALL: Final = 1e-6
@@ -70,14 +67,12 @@ def rk4_servo_limit(ratio: float) -> float:
     return smallest_instability(lambda h: float(np.abs(polynomial(h * roots)).max()))
 
 
-def explicit_damping_limit(ratio: float) -> float:
-    """Return the largest h w of semi-implicit Euler with the damper taken from before the step."""
+def damping_limit(ratio: float) -> float:
+    """Return the largest h w of semi-implicit Euler with the damper taken from before the step.
+
+    Of minus the ``ratio`` it is that with the damper taken from after the step.
+    """
     return 2.0 * math.sqrt(ratio**2 + 1.0) - 2.0 * ratio
-
-
-def implicit_damping_limit(ratio: float) -> float:
-    """Return the largest h w of semi-implicit Euler with the damper taken from after the step."""
-    return explicit_damping_limit(-ratio)
 
 
 def drag_limit(method: Integrator) -> float:
@@ -109,7 +104,6 @@ def rk4_aliasing() -> float:
 def _servo(
     method: MujocoMethod, ratio: float, joint_damping: bool, effort: Effort, phase: float
 ) -> bool:
-    """Say whether 1 kg on a slide joint with a servo of h w = ``phase`` stays where it is."""
     spec, frequency = new_spec(method, DT_S), phase / DT_S
     add_ball(spec, (0.0, 0.0, 0.0), 0.1, slides=UPWARDS)
     (joint,) = spec.joints
@@ -128,7 +122,6 @@ def _servo(
 
 
 def _our_drag(method: Integrator, _effort: Effort, phase: float) -> bool:
-    """Say whether a cube that drag brakes, c h / m = ``phase``, is never faster."""
     state = State.create(Body.cube(1.0, 1.0), velocity=(1.0, 0.0, 0.0))
     motion = trajectory(state, method, 1.0, OUR_STEPS, load=linear_drag(phase))
     return all(abs(reached.velocity[0, 0]) <= 1.0 for reached in motion)
@@ -148,24 +141,23 @@ def _mujoco_drag(method: MujocoMethod, flags: int, effort: Effort, phase: float)
 
 
 def _spring(state: State, _t: float) -> Wrench:
-    """Return the pull of a spring of 1 N/m to the origin: w = 1 on 1 kg."""
+    # 1 N/m to the origin on 1 kg: w = 1.
     return Wrench(-state.position, np.zeros_like(state.position))
 
 
-def _swing(method: Integrator, phase: float, steps: int) -> Iterator[float]:
+def _swing(method: str, phase: float, steps: int) -> Iterator[float]:
     """Yield the amplitude, which is 1 at the start, after each step of h w = ``phase``."""
     state = State.create(Body.cube(1.0, 1.0), position=(1.0, 0.0, 0.0))
-    for reached in trajectory(state, method, phase, steps, load=_spring):
+    for reached in trajectory(state, INTEGRATORS[method], phase, steps, load=_spring):
         yield float(np.hypot(reached.position[0, 0], reached.velocity[0, 0]))
 
 
-def _oscillation(method: Integrator, _effort: Effort, phase: float) -> bool:
-    """Say whether a swing stays; close to the limit a stable one may grow a thousand times."""
+def _oscillation(method: str, _effort: Effort, phase: float) -> bool:
     return all(amplitude < 1e3 for amplitude in _swing(method, phase, 2 * OUR_STEPS))
 
 
 def _explicit_gain(phase: float, _effort: Effort) -> float:
-    *_, last = _swing(INTEGRATORS["explicit_euler"], phase, OUR_STEPS)
+    *_, last = _swing("explicit_euler", phase, OUR_STEPS)
     return last
 
 
@@ -174,15 +166,14 @@ def _spinning(rate: float) -> State:
 
 
 def _norm(_effort: Effort, phase: float) -> bool:
-    """Say whether the quaternion's norm has not grown, without renormalising."""
     raw = RungeKutta4(renormalise=False, renormalise_stages=False)
     motion = trajectory(_spinning(phase), raw, 1.0, OUR_STEPS)
     return all(float(np.linalg.norm(reached.orientation)) <= 1.0 for reached in motion)
 
 
-def _our_turn(method: Integrator, _effort: Effort, phase: float) -> bool:
+def _our_turn(method: str, _effort: Effort, phase: float) -> bool:
     """Say whether a step, read as the shortest turn between two poses, has the spin's sense."""
-    end = advance(_spinning(phase), method, 1.0, 1)
+    end = advance(_spinning(phase), INTEGRATORS[method], 1.0, 1)
     return bool(end.rotation[0, 0] * end.rotation[0, 3] > 0.0)
 
 
@@ -196,43 +187,43 @@ def _mujoco_turn(method: MujocoMethod, _effort: Effort, phase: float) -> bool:
     return bool(data.qpos[3] * data.qpos[6] > 0.0)
 
 
-def _cases() -> Iterator[tuple[str, Case]]:
-    for key, method, joint_damping, limit in (
-        ("euler_actuator", EULER, False, explicit_damping_limit),
-        ("euler_joint", EULER, True, implicit_damping_limit),
-        ("implicitfast", IMPLICITFAST, False, implicit_damping_limit),
-        ("rk4", RK4, False, rk4_servo_limit),
-        ("discrete", DISCRETE, False, lambda _: math.inf),
-    ):
-        for ratio in (0.0, 0.5, 1.0):
-            holds = partial(_servo, method, ratio, joint_damping)
-            yield f"servo_{key}_{ratio:g}", Case(limit(ratio), holds=holds)
-    for name, integrator in INTEGRATORS.items():
-        yield f"drag_{name}", Case(drag_limit(integrator), holds=partial(_our_drag, integrator))
-    explicit = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
-    for key, method, flags, predicted in (
-        ("rk4", RK4, 0, drag_limit(INTEGRATORS["rk4"])),
-        ("euler_explicit", EULER, explicit, 2.0),
-        ("euler", EULER, 0, math.inf),
-        ("implicitfast", IMPLICITFAST, 0, math.inf),
-        ("discrete", DISCRETE, 0, math.inf),
-    ):
-        holds = partial(_mujoco_drag, method, flags)
-        yield f"drag_mujoco_{key}", Case(predicted, holds=holds)
-    for phase in (0.01, 0.1, 0.2):
-        growth = (1.0 + phase**2) ** (OUR_STEPS / 2)
-        value = partial(_explicit_gain, phase)
-        yield f"oscillation_explicit_euler_{phase:g}", Case(growth, value=value)
-    for name, predicted in (("semi_implicit_euler", 2.0), ("rk4", 2.0 * math.sqrt(2.0))):
-        holds = partial(_oscillation, INTEGRATORS[name])
-        yield f"oscillation_{name}", Case(predicted, holds=holds)
-    yield "spin_rk4_norm", Case(4.0 * math.sqrt(2.0), holds=_norm)
-    for name, predicted in (("lie_rk4", math.pi), ("splitting2", math.pi), ("rk4", rk4_aliasing())):
-        holds = partial(_our_turn, INTEGRATORS[name])
-        yield f"spin_aliasing_{name}", Case(predicted, holds=holds)
-    for key, method in (("euler", EULER), ("rk4", RK4)):
-        yield f"spin_aliasing_mujoco_{key}", Case(math.pi, holds=partial(_mujoco_turn, method))
+_SERVOS: Final[Mapping[str, tuple[MujocoMethod, bool, Callable[[float], float]]]] = {
+    "euler_actuator": (EULER, False, damping_limit),
+    "euler_joint": (EULER, True, lambda ratio: damping_limit(-ratio)),
+    "implicitfast": (IMPLICITFAST, False, lambda ratio: damping_limit(-ratio)),
+    "rk4": (RK4, False, rk4_servo_limit),
+    "discrete": (DISCRETE, False, lambda _: math.inf),
+}
+_EXPLICIT: Final = int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
 
-
-SMOOTH: Final[Mapping[str, Case]] = dict(_cases())
+SMOOTH: Final[Mapping[str, Case]] = {
+    **{
+        f"servo_{key}_{ratio:g}": Limit(limit(ratio), partial(_servo, method, ratio, joint))
+        for key, (method, joint, limit) in _SERVOS.items()
+        for ratio in (0.0, 0.5, 1.0)
+    },
+    **{
+        f"drag_{name}": Limit(drag_limit(method), partial(_our_drag, method))
+        for name, method in INTEGRATORS.items()
+    },
+    "drag_mujoco_rk4": Limit(drag_limit(INTEGRATORS["rk4"]), partial(_mujoco_drag, RK4, 0)),
+    "drag_mujoco_euler_explicit": Limit(2.0, partial(_mujoco_drag, EULER, _EXPLICIT)),
+    "drag_mujoco_euler": Limit(math.inf, partial(_mujoco_drag, EULER, 0)),
+    "drag_mujoco_implicitfast": Limit(math.inf, partial(_mujoco_drag, IMPLICITFAST, 0)),
+    "drag_mujoco_discrete": Limit(math.inf, partial(_mujoco_drag, DISCRETE, 0)),
+    **{
+        f"oscillation_explicit_euler_{phase:g}": Quantity(
+            (1.0 + phase**2) ** (OUR_STEPS / 2), partial(_explicit_gain, phase)
+        )
+        for phase in (0.01, 0.1, 0.2)
+    },
+    "oscillation_semi_implicit_euler": Limit(2.0, partial(_oscillation, "semi_implicit_euler")),
+    "oscillation_rk4": Limit(2.0 * math.sqrt(2.0), partial(_oscillation, "rk4")),
+    "spin_rk4_norm": Limit(4.0 * math.sqrt(2.0), _norm),
+    "spin_aliasing_lie_rk4": Limit(math.pi, partial(_our_turn, "lie_rk4")),
+    "spin_aliasing_splitting2": Limit(math.pi, partial(_our_turn, "splitting2")),
+    "spin_aliasing_rk4": Limit(rk4_aliasing(), partial(_our_turn, "rk4")),
+    "spin_aliasing_mujoco_euler": Limit(math.pi, partial(_mujoco_turn, EULER)),
+    "spin_aliasing_mujoco_rk4": Limit(math.pi, partial(_mujoco_turn, RK4)),
+}
 """By name."""
