@@ -21,6 +21,9 @@ from roller_env.lab.contact.simbenchmark import (
     squared_penetration,
 )
 from roller_env.lab.methods import MujocoMethod
+from roller_env.lab.simulate import Float64, Path
+
+EULER = MujocoMethod("Euler")
 
 NAMED = {scene.name: scene for scene in SCENES}
 
@@ -47,14 +50,20 @@ def test_the_box_and_the_balls_accelerate_as_worked_out_by_hand() -> None:
     assert ball == pytest.approx(0.211)
 
 
+def rolled(scene: Rolling, time: Float64, box: Float64, ball: Float64) -> float:
+    """Return the error of a box and a first ball of these velocities."""
+    qvel = np.hstack([box, np.zeros_like(box), ball])
+    return scene.judge(Path(time, np.empty((len(time), 0)), qvel), EULER)["velocity"]
+
+
 @pytest.mark.parametrize("scene", [ROLLING_Y, ROLLING_XY], ids=lambda scene: scene.name)
 def test_exact_velocities_have_no_error(scene: Rolling) -> None:
     time = np.linspace(0.0, 1.0, 11)
     way = np.array([*scene.direction, 0.0])
     box, ball = (np.multiply.outer(a * time, way) for a in scene.accelerations_m_s2)
-    assert scene.error(time, box, ball) == pytest.approx(0.0, abs=1e-30)
+    assert rolled(scene, time, box, ball) == pytest.approx(0.0, abs=1e-30)
     box[3] += (0.1, 0.0, -0.2)
-    assert scene.error(time, box, ball) == pytest.approx(0.05 / 10)
+    assert rolled(scene, time, box, ball) == pytest.approx(0.05 / 10)
 
 
 def test_a_box_that_does_not_move_has_the_error_published_for_those_that_did_not() -> None:
@@ -62,7 +71,7 @@ def test_a_box_that_does_not_move_has_the_error_published_for_those_that_did_not
     time = np.linspace(0.0, 4.0, 4001)
     still = np.zeros((4001, 3))
     row = published("rolling-xy", "ODE quick", 1e-3)
-    assert ROLLING_XY.error(time, still, still) == pytest.approx(row.error, rel=2e-6)
+    assert rolled(ROLLING_XY, time, still, still) == pytest.approx(row.error, rel=2e-6)
 
 
 @pytest.mark.parametrize("scene", [ROLLING_Y, ROLLING_XY], ids=lambda scene: scene.name)
@@ -85,13 +94,12 @@ def test_the_pyramidal_cone_lets_the_box_run_away_unless_pushed_along_an_edge() 
 def test_the_energy_error_by_hand() -> None:
     """Two samples count and the last does not; in one every ball is 1 mm high and spins."""
     assert BOUNCING.energy_j == pytest.approx(24034.5)
-    height = np.full((3, 49), 5.0)
-    velocity = np.zeros((3, 49, 6))
-    height[1] += 1e-3
-    velocity[1, :, 3] = 2.0
-    height[2] = -1.0
+    qpos, qvel = np.zeros((3, 49, 7)), np.zeros((3, 49, 6))
+    qpos[:, :, 2] = [[5.0], [5.0 + 1e-3], [-1.0]]
+    qvel[1, :, 3] = 2.0
+    path = Path(np.arange(3.0), qpos.reshape(3, -1), qvel.reshape(3, -1))
     off = 49 * (10.0 * 9.81 * 1e-3 + 0.5 * (0.4 * 10.0 * 0.1**2) * 4.0)
-    assert BOUNCING.error(height, velocity) == pytest.approx(off**2 / 2.0)
+    assert BOUNCING.judge(path, EULER)["energy"] == pytest.approx(off**2 / 2.0)
 
 
 def test_the_games_elasticity_closes_the_row_that_mujoco_lacked() -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -11,7 +12,7 @@ from typing import Any, Final
 
 import mujoco
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from roller_env.lab.contact import scene
 from roller_env.lab.game import GRAVITY_M_S2, MASS_KG, RADIUS_M
@@ -37,17 +38,13 @@ def falling_balls(
 
 @dataclass(frozen=True)
 class Bounce(scene.ContactScene):
-    """A ball dropped on a spring-damper that stays the same at every step.
+    """A ball dropped from ``height_m`` on a spring-damper that stays the same at every step.
 
-    *Discretisation* is the distance from the contact's own law, integrated from event to event
-    (`soft_bounce`): the step that touching falls into is wrong to first order with every method,
-    RK4 included, since none looks for the event. So one run has the luck of where in a step the
-    ball touches. *Model* is the distance from a rigid ball that loses 1 - e of its speed at once.
-
-    Attributes:
-        height_m: of the drop.
-        elasticity: e.
-        frequency_rad_s: of the spring, undamped; Euler's limit is h = 2 / frequency.
+    *Discretisation* is the distance from the contact's own law (`soft_bounce`): the step that
+    touching falls into is wrong to first order with every method, RK4 included, since none looks
+    for the event. So one run has the luck of where in a step the ball touches. *Model* is the
+    distance from a rigid ball that loses 1 - ``elasticity`` of its speed at once. The spring's
+    frequency is the undamped one; Euler's limit is h = 2 / frequency.
     """
 
     height_m: float = 1.0
@@ -60,26 +57,20 @@ class Bounce(scene.ContactScene):
         ratio = damping_ratio(self.elasticity)
         return -(self.frequency_rad_s**2), -2.0 * ratio * self.frequency_rad_s
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
-        def lift(data: mujoco.MjData) -> None:
-            data.qpos[0] = self.height_m
+    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        """Return one ball."""
+        return falling_balls(method, dt_s, [scene.contact_of(0.0, self.solref)])
 
-        def judge(path: Path) -> Mapping[str, float]:
-            soft = soft_bounce(self.height_m, self.solref, self.horizon_s)
-            rigid = rigid_bounce(self.height_m, self.elasticity, self.horizon_s)
-            errors = np.abs(path.qpos[-1, 0] - np.array((soft, rigid))) / self.height_m
-            return dict(zip(("position", "rigid"), errors.tolist(), strict=True))
+    def start(self, data: mujoco.MjData, dt_s: float) -> None:
+        """Lift it."""
+        data.qpos[0] = self.height_m
 
-        spec = falling_balls(method, dt_s, [scene.contact_of(0.0, self.solref)])
-        return scene.MujocoTrial(self, spec, judge, lift)
-
-
-def _event(
-    crossing: Callable[[float, Float64], float], direction: float
-) -> Callable[[float, Float64], float]:
-    """Return what ends an integration of SciPy's where it crosses 0 upwards or downwards."""
-    crossing.terminal, crossing.direction = True, direction  # type: ignore[attr-defined]
-    return crossing
+    def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
+        """Return errors of the height in parts of the drop."""
+        soft = soft_bounce(self.height_m, self.solref, self.horizon_s)
+        rigid = rigid_bounce(self.height_m, self.elasticity, self.horizon_s)
+        errors = np.abs(path.qpos[-1, 0] - np.array((soft, rigid))) / self.height_m
+        return dict(zip(("position", "rigid"), errors.tolist(), strict=True))
 
 
 @cache
@@ -87,34 +78,39 @@ def soft_bounce(height_m: float, solref: tuple[float, float], time_s: float) -> 
     """Return the height, metres, of a ball dropped on a soft contact after ``time_s``.
 
     MuJoCo's contact of constant impedance d gives a penetrating ball, r < 0, the acceleration
-    -K r - B v - (1 - d) g as long as that takes a push (Computation chapter, "Constraint model");
-    everywhere else it falls. Touching (r = 0) and letting go (no push left, or r = 0) are found as
-    events of an integration to 13 digits.
+    -K r - B v - (1 - d) g as long as that takes a push (Computation chapter, "Constraint model"): a
+    damped swing about where it would rest. Everywhere else it falls.
 
     Raises:
-        ValueError: the ball comes to rest before, which is not an event.
+        ValueError: the ball comes to rest before, and no longer leaves the ground by a push's end.
     """
     stiffness, damping = -solref[0], -solref[1]
+    exponent = complex(-damping / 2.0, math.sqrt(stiffness - damping**2 / 4.0))
+    rest = (1.0 - IMPEDANCE) * GRAVITY_M_S2 / stiffness
 
-    def push(_t: float, y: Float64) -> float:
-        return float(-stiffness * y[0] - damping * y[1] + IMPEDANCE * GRAVITY_M_S2)
+    def pressed(time: float, speed: float) -> tuple[float, float]:
+        start = complex(rest, (exponent.real * rest + speed) / exponent.imag)
+        swing = start * cmath.exp(exponent * time)
+        return swing.real - rest, (exponent * swing).real
 
-    def fall(_t: float, y: Float64) -> list[float]:
-        return [y[1], -GRAVITY_M_S2]
+    def push(time: float, speed: float) -> float:
+        height, velocity = pressed(time, speed)
+        return -stiffness * height - damping * velocity + IMPEDANCE * GRAVITY_M_S2
 
-    def press(t: float, y: Float64) -> list[float]:
-        return [y[1], push(t, y) - GRAVITY_M_S2]
-
-    touch = _event(lambda _t, y: float(y[0]), -1.0)
-    let_go = [_event(push, -1.0), _event(lambda _t, y: float(y[0]), 1.0)]
-    now, state, falling = 0.0, np.array([height_m, 0.0]), True
-    while now < time_s:
-        if not falling and abs(state[1]) < GRAVITY_M_S2 / damping:
-            raise ValueError(f"time_s: found {time_s:g}; the ball is at rest after {now:g} s")
-        law, events = (fall, [touch]) if falling else (press, let_go)
-        part = solve_ivp(law, (now, time_s), state, "DOP853", rtol=1e-13, atol=1e-15, events=events)
-        now, state, falling = float(part.t[-1]), part.y[:, -1], not falling
-    return float(state[0])
+    left, height, velocity = time_s, height_m, 0.0
+    while True:
+        speed = math.sqrt(velocity**2 + 2.0 * GRAVITY_M_S2 * height)
+        flight = (velocity + speed) / GRAVITY_M_S2
+        if left <= flight:
+            return height + velocity * left - 0.5 * GRAVITY_M_S2 * left**2
+        left -= flight
+        if speed < 2.0 * GRAVITY_M_S2 / damping:
+            then = f"{time_s - left:g} s"
+            raise ValueError(f"time_s: found {time_s:g}; the ball is at rest after {then}")
+        contact = brentq(push, 0.0, math.pi / exponent.imag, (speed,), xtol=1e-15)
+        if left <= contact:
+            return pressed(left, speed)[0]
+        left, (height, velocity) = left - contact, pressed(contact, speed)
 
 
 def rigid_bounce(height_m: float, elasticity: float, time_s: float) -> float:
@@ -127,13 +123,15 @@ def rigid_bounce(height_m: float, elasticity: float, time_s: float) -> float:
     return speed * left - 0.5 * GRAVITY_M_S2 * left**2
 
 
-ELASTICITIES: Final = (0.0, 0.2, 0.5, 0.8, 0.95)
-SPEEDS_M_S: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
 FAST_M_S: Final = 2.0
 """Impacts from here on are what a player takes for bounces: e = 0.8 throws the ball 0.13 m high."""
 
-ARRIVALS: Final = (0.2, 0.5, 0.8)
-"""Fractions of a step after which a ball touches the ground, on which its bounce must not depend"""
+ELASTICITIES: Final = (0.0, 0.2, 0.5, 0.8, 0.95)
+ELASTICITY, SPEED_M_S, ARRIVAL = np.array(
+    [*product(ELASTICITIES, (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0), (0.2, 0.5, 0.8))]
+).T
+"""Of each ball; arrivals are the fractions of a step after which it touches the ground, on which
+its bounce must not depend."""
 
 
 class Restitution(scene.ContactScene):
@@ -146,24 +144,22 @@ class Restitution(scene.ContactScene):
     one-step contact does not reckon with (1 - B h becomes 1 / (1 + B h) > 0): it never bounces.
     """
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
-        elasticity, speed, arrival = np.array([*product(ELASTICITIES, SPEEDS_M_S, ARRIVALS)]).T
-        height = speed * dt_s * arrival
+    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        """Return a ball for each elasticity, speed and arrival."""
+        return falling_balls(method, dt_s, [calibrated(e, method, dt_s) for e in ELASTICITY])
 
-        def throw(data: mujoco.MjData) -> None:
-            data.qpos[:] = height
-            # The speed at the ground is the nominal one.
-            data.qvel[:] = -np.sqrt(np.maximum(speed**2 - 2.0 * GRAVITY_M_S2 * height, 0.0))
+    def start(self, data: mujoco.MjData, dt_s: float) -> None:
+        """Throw them so that the speed at the ground is the nominal one."""
+        data.qpos[:] = height = SPEED_M_S * dt_s * ARRIVAL
+        data.qvel[:] = -np.sqrt(np.maximum(SPEED_M_S**2 - 2.0 * GRAVITY_M_S2 * height, 0.0))
 
-        def judge(path: Path) -> Mapping[str, float]:
-            error = np.abs(returned_speed(path) / speed - elasticity)
-            chosen = {"worst": speed > 0.0, "fast": speed >= FAST_M_S} | {
-                f"e={one:g}": elasticity == one for one in ELASTICITIES
-            }
-            return {name: float(error[those].max()) for name, those in chosen.items()}
-
-        contacts = [calibrated(one, method, dt_s) for one in elasticity]
-        return scene.MujocoTrial(self, falling_balls(method, dt_s, contacts), judge, throw)
+    def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
+        """Return the largest error of the coefficient of restitution: of all, of some."""
+        error = np.abs(returned_speed(path) / SPEED_M_S - ELASTICITY)
+        chosen = {"worst": SPEED_M_S > 0.0, "fast": SPEED_M_S >= FAST_M_S} | {
+            f"e={one:g}": one == ELASTICITY for one in ELASTICITIES
+        }
+        return {name: float(error[those].max()) for name, those in chosen.items()}
 
 
 def calibrated(elasticity: float, method: MujocoMethod, dt_s: float) -> dict[str, Any]:

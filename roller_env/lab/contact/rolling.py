@@ -64,29 +64,31 @@ class SteadyRoll(scene.BallScene):
         pull = GRAVITY_M_S2 * math.sin(math.radians(self.slope_deg))
         return 5.0 / 7.0 * (pull + self.force_n / MASS_KG)
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
+    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        """Return the ball at rest on the slope."""
         spec = scene.new_spec(method, dt_s, GRAVITY_M_S2, impratio=IMPRATIO, **scene.CONVERGED)
         angle = math.radians(self.slope_deg)
-        normal = np.array([math.sin(angle), 0.0, math.cos(angle)])
-        along = np.array([math.cos(angle), 0.0, -math.sin(angle)])
         tilt = [math.cos(angle / 2.0), 0.0, math.sin(angle / 2.0), 0.0]
         scene.add_ground(spec, quat=tilt, **scene.contact_of(FRICTION, SOFT_SOLREF))
-        depth = scene.resting_depth(SOFT_SOLREF, GRAVITY_M_S2 * math.cos(angle))
-        start = (RADIUS_M - depth) * normal
-        scene.add_ball(spec, start.tolist(), RADIUS_M, MASS_KG)
-        displacement = 0.5 * self.acceleration_m_s2 * self.horizon_s**2
+        height = RADIUS_M - scene.resting_depth(SOFT_SOLREF, GRAVITY_M_S2 * math.cos(angle))
+        at = (height * math.sin(angle), 0.0, height * math.cos(angle))
+        scene.add_ball(spec, at, RADIUS_M, MASS_KG)
+        return spec
 
-        def push(data: mujoco.MjData) -> None:
-            data.xfrc_applied[1, 0] = self.force_n
+    def start(self, data: mujoco.MjData, dt_s: float) -> None:
+        """Push."""
+        data.xfrc_applied[1, 0] = self.force_n
 
-        def judge(path: Path) -> Mapping[str, float]:
-            (away,), (moved,) = self.away(path), self.places(path) - start
-            return {
-                "position": float(np.linalg.norm(away) / np.linalg.norm(moved - away)),
-                "acceleration": abs(float(moved @ along) / displacement - 1.0),
-            }
-
-        return scene.MujocoTrial(self, spec, judge, push)
+    def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
+        """Return errors of the position in parts of the displacement."""
+        angle = math.radians(self.slope_deg)
+        along = (math.cos(angle), 0.0, -math.sin(angle))
+        rigid = 0.5 * self.acceleration_m_s2 * self.horizon_s**2
+        (away,), (moved,) = self.away(path), self.places(path) - path.qpos[0, :3]
+        return {
+            "position": float(np.linalg.norm(away) / np.linalg.norm(moved - away)),
+            "acceleration": abs(float(moved @ along) / rigid - 1.0),
+        }
 
 
 @dataclass(frozen=True)
@@ -126,26 +128,28 @@ class Skid(scene.BallScene):
         braked = 0.5 * FRICTION * GRAVITY_M_S2 * skids**2
         return (self.speed_m_s * (skids + 5.0 / 7.0 * rolls) - braked) * self.direction
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
+    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        """Return the ball at rest on the ground."""
         spec = scene.new_spec(method, dt_s, GRAVITY_M_S2, impratio=IMPRATIO, **scene.CONVERGED)
         contact = scene.game_contact()
         scene.add_ground(spec, **contact)
         depth = scene.resting_depth(contact["solref"], GRAVITY_M_S2)
         scene.add_ball(spec, (0.0, 0.0, RADIUS_M - depth), RADIUS_M, MASS_KG)
+        return spec
 
-        def throw(data: mujoco.MjData) -> None:
-            data.qvel[:2] = self.speed_m_s * self.direction
+    def start(self, data: mujoco.MjData, dt_s: float) -> None:
+        """Throw."""
+        data.qvel[:2] = self.speed_m_s * self.direction
 
-        def judge(path: Path) -> Mapping[str, float]:
-            heading = np.arctan2(*path.qvel[:, 1::-1].T) - math.radians(self.heading_deg)
-            return {
-                "position": float(np.linalg.norm(self.away(path, method.cone)[0, :2])),
-                "roll_time": abs(roll_time(path) / self.rolls_after_s - 1.0),
-                "heading": math.degrees(float(np.abs(heading).max())),
-                "place": float(np.linalg.norm(path.qpos[-1, :2] - self.rigid_place_m)),
-            }
-
-        return scene.MujocoTrial(self, spec, judge, throw)
+    def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
+        """Return errors against the converged and the rigid ball."""
+        heading = np.arctan2(*path.qvel[:, 1::-1].T) - math.radians(self.heading_deg)
+        return {
+            "position": float(np.linalg.norm(self.away(path, method.cone)[0, :2])),
+            "roll_time": abs(roll_time(path) / self.rolls_after_s - 1.0),
+            "heading": math.degrees(float(np.abs(heading).max())),
+            "place": float(np.linalg.norm(path.qpos[-1, :2] - self.rigid_place_m)),
+        }
 
 
 def roll_time(path: Path) -> float:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path as File
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import mujoco
 import numpy as np
@@ -20,7 +20,7 @@ from pandas import read_csv
 from roller_env.lab.game import FRICTION
 from roller_env.lab.methods import MUJOCO, Cone, Method, MujocoMethod, without_warnings
 from roller_env.lab.scene import Measure
-from roller_env.lab.simulate import Float64, Path, Start, record
+from roller_env.lab.simulate import Float64, Path, record
 from roller_env.physics.materials import IMPEDANCE, contact_parameters
 from roller_env.physics.presets import PRESETS, PhysicsPreset
 
@@ -132,34 +132,15 @@ class MujocoTrial:
     but MuJoCo's loop. SimBenchmark, too, measures error and time in two passes.
     """
 
-    def __init__(
-        self,
-        scene: ContactScene,
-        spec: mujoco.MjSpec,
-        judge: Callable[[Path], Mapping[str, float]],
-        start: Start | None = None,
-        plan: Plan = (),
-        timed_s: tuple[float, float] | None = None,
-    ):
-        """Prepare a simulation.
-
-        Args:
-            scene: whose simulation it is.
-            spec: the world.
-            judge: errors of a path by the name of their measure; only ever given finite paths.
-            start: puts freshly reset data where the motion begins.
-            plan: controls of the whole motion, if it has any.
-            timed_s: begin and end of what is timed, if that is not all. `run` must have passed it.
-        """
-        self.model = spec.compile()
+    def __init__(self, scene: ContactScene, method: MujocoMethod, dt_s: float):
+        """Prepare a simulation of ``scene``."""
+        self.model = scene.world(method, dt_s).compile()
         self.data = mujoco.MjData(self.model)
-        self._scene, self._judge, self._start = scene, judge, start
-        dt_s = self.model.opt.timestep
-        self._plan = [(steps_of(s, dt_s), ctrl) for s, ctrl in plan or ((scene.horizon_s, ()),)]
+        self._scene, self._method = scene, method
+        self._plan = [(steps_of(seconds, dt_s), ctrl) for seconds, ctrl in scene.plan]
         self._steps = sum(steps for steps, _ in self._plan)
-        self._part = range(self._steps)
-        if timed_s is not None:
-            self._part = range(*(round(moment / dt_s) for moment in timed_s))
+        first, last = (round(moment / dt_s) for moment in scene.timed_s or (0.0, scene.horizon_s))
+        self._part = range(first, last)
         self._before_part = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         self._path: Path | None = None
 
@@ -172,8 +153,7 @@ class MujocoTrial:
         """Simulate the whole motion and keep its path."""
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
-        if self._start is not None:
-            self._start(data)
+        self._scene.start(data, model.opt.timestep)
         begins = np.cumsum([0, *(steps for steps, _ in self._plan)]).tolist()[:-1]
 
         def control(step: int) -> None:
@@ -203,7 +183,7 @@ class MujocoTrial:
     def errors(self) -> Mapping[str, float]:
         """Return the errors by the name of their measure, NaN where it diverged."""
         if self.path.finite:
-            return self._judge(self.path)
+            return self._scene.judge(self.path, self._method)
         return {measure.name: math.nan for measure in self._scene.measures}
 
 
@@ -252,10 +232,26 @@ class ContactScene(ABC):
                 f"allowed are {', '.join(repr(one.name) for one in self.methods)}"
             )
         steps_of(self.horizon_s, dt_s)
-        return self._trial(method, dt_s)
+        return MujocoTrial(self, method, dt_s)
+
+    timed_s: ClassVar[tuple[float, float] | None] = None
+    """Begin and end of what is timed, if that is not all."""
 
     @abstractmethod
-    def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial: ...
+    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        """Return the scene's bodies, ground and settings."""
+
+    def start(self, data: mujoco.MjData, dt_s: float) -> None:  # noqa: B027 - most fall or roll off
+        """Put the freshly reset data where the motion begins."""
+
+    @property
+    def plan(self) -> Plan:
+        """Controls of the whole motion."""
+        return ((self.horizon_s, ()),)
+
+    @abstractmethod
+    def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
+        """Return the errors of a finite path by the name of their measure."""
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,10 @@ class Rolling(scene.ContactScene):
         f2 = (self.force_n - f1) / self.box_kg / (3.5 / self.ball_kg + self.balls / self.box_kg)
         return (self.force_n - f1 - self.balls * f2) / self.box_kg, f2 / self.ball_kg
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
+    timed_s = (0.0, 0.2)
+
+    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        """Return the box on the ground and the balls on the box."""
         spec = benchmark_spec(method, dt_s, self.ground_friction)
         half_edge, half_height, overlap = 10.0, 0.5, 2e-6
         box = spec.worldbody.add_body(pos=[0.0, 0.0, half_height - overlap])
@@ -103,27 +106,24 @@ class Rolling(scene.ContactScene):
             for y in np.arange(-4.0, 5.0, 2.0):
                 at = (x, y, 3.0 * half_height - overlap)
                 scene.add_ball(spec, at, half_height, self.ball_kg, **rubbing(self.ball_friction))
+        return spec
 
-        def push(data: mujoco.MjData) -> None:
-            data.xfrc_applied[1, :2] = self.force_n * np.array(self.direction)
+    def start(self, data: mujoco.MjData, dt_s: float) -> None:
+        """Push the box."""
+        data.xfrc_applied[1, :2] = self.force_n * np.array(self.direction)
 
-        def judge(path: Path) -> Mapping[str, float]:
-            return {"velocity": self.error(path.time, path.qvel[:, :3], path.qvel[:, 6:9])}
+    def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
+        """Return the mean over time of the squared errors, (m/s)², of box's and first ball's speed.
 
-        return scene.MujocoTrial(self, spec, judge, push, timed_s=(0.0, 0.2))
-
-    def error(self, time: Float64, box: Float64, ball: Float64) -> float:
-        """Return SimBenchmark's error, (m/s)²: the mean over time of both squared velocity errors.
-
-        Of times (S + 1,) and velocities (S + 1, 3), m/s, of the box and of the first ball; the
-        samples are those at the beginnings of the steps.
+        The samples are those at the beginnings of the steps.
         """
         squares = 0.0
         way = np.append(self.direction, 0.0)
-        for acceleration, velocity in zip(self.accelerations_m_s2, (box, ball), strict=True):
-            exact = acceleration * time[:-1, None] * way
-            squares += float(((velocity[:-1] - exact) ** 2).sum(axis=1).mean())
-        return squares
+        velocities = path.qvel[:-1, :3], path.qvel[:-1, 6:9]
+        for acceleration, velocity in zip(self.accelerations_m_s2, velocities, strict=True):
+            exact = acceleration * path.time[:-1, None] * way
+            squares += float(((velocity - exact) ** 2).sum(axis=1).mean())
+        return {"velocity": squares}
 
 
 class Bouncing(scene.ContactScene):
@@ -142,29 +142,28 @@ class Bouncing(scene.ContactScene):
     energy_j = side**2 * ball_kg * GRAVITY_M_S2 * height_m
     """Of all balls at the start, above the ground."""
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
+    timed_s = (0.0, 2.0)
+
+    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        """Return the balls over the ground."""
         spec = benchmark_spec(method, dt_s, 0.0)
         contact = calibrated(1.0, method, dt_s)
         for x, y in np.ndindex(self.side, self.side):
             at = (2.0 * x, 2.0 * y, self.height_m)
             scene.add_ball(spec, at, self.radius_m, self.ball_kg, **contact)
+        return spec
 
-        def judge(path: Path) -> Mapping[str, float]:
-            return {"energy": self.error(path.qpos[:, 2::7], path.qvel.reshape(-1, 49, 6))}
+    def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
+        """Return the mean over time of the squared error of the energy, J².
 
-        return scene.MujocoTrial(self, spec, judge, timed_s=(0.0, 2.0))
-
-    def error(self, height: Float64, velocity: Float64) -> float:
-        """Return SimBenchmark's error, J²: the mean over time of the squared error of the energy.
-
-        Of heights (S + 1, balls) of the centres, m, and velocities (S + 1, balls, 6), linear and
-        angular, m/s and rad/s; the samples are those at the beginnings of the steps.
+        The samples are those at the beginnings of the steps.
         """
+        height, velocity = path.qpos[:-1, 2::7], path.qvel[:-1].reshape(-1, self.side**2, 6)
         inertia = 0.4 * self.ball_kg * self.radius_m**2
         doubled = self.ball_kg * velocity[..., :3] ** 2 + inertia * velocity[..., 3:] ** 2
         potential = self.ball_kg * GRAVITY_M_S2 * height.sum(axis=1)
         energy = 0.5 * doubled.sum(axis=(1, 2)) + potential
-        return float(((energy - self.energy_j)[:-1] ** 2).mean())
+        return {"energy": float(((energy - self.energy_j) ** 2).mean())}
 
 
 @dataclass(frozen=True)
@@ -191,7 +190,11 @@ class SixSixSix(scene.ContactScene):
         """Squared overlap of all balls at the origin, which SimBenchmark's first sample shows."""
         return squared_penetration(np.zeros((self.side**3, 3)), self.radius_m)
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> scene.MujocoTrial:
+    timed_s = (1.0, 1.5)
+    """While the pile falls apart."""
+
+    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        """Return the cube over the ground."""
         spec = benchmark_spec(method, dt_s, self.friction)
         # Deep piles have many contacts at large steps.
         spec.memory = 2**28
@@ -202,15 +205,17 @@ class SixSixSix(scene.ContactScene):
         for place in np.ndindex(self.side, self.side, self.side):
             at = self.gap_m * np.array(place) + self.disturbance_m * random.random(3) + lowest
             scene.add_ball(spec, at, self.radius_m, self.ball_kg, **contact)
+        return spec
 
-        def judge(path: Path) -> Mapping[str, float]:
-            places = path.qpos.reshape(len(path.qpos), -1, 7)[:-1, :, :3]
-            squares = np.array([squared_penetration(one, self.radius_m) for one in places])
-            published = np.array([self.empty_sample_m2, *squares[1:]])
-            return {"penetration": float(squares.mean()), "as_published": float(published.mean())}
+    def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
+        """Return the mean over time of the squared penetration, m², and as it was published.
 
-        # Timed while the pile falls apart.
-        return scene.MujocoTrial(self, spec, judge, timed_s=(1.0, 1.5))
+        The samples are those at the beginnings of the steps.
+        """
+        places = path.qpos[:-1].reshape(len(path.qpos) - 1, -1, 7)[:, :, :3]
+        squares = np.array([squared_penetration(one, self.radius_m) for one in places])
+        published = np.array([self.empty_sample_m2, *squares[1:]])
+        return {"penetration": float(squares.mean()), "as_published": float(published.mean())}
 
 
 def squared_penetration(centres: Float64, radius_m: float) -> float:

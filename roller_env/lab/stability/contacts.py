@@ -285,7 +285,7 @@ def _seam(dt_s: float, effort: Effort) -> float:
 HOP_M_S: Final = 4.0
 
 
-def hop_speed(dt_s: float, share: float) -> float:
+def hop_speed(dt_s: float, share: float = DAMPING_STEPS) -> float:
     """Return the speed, m/s, with which the game's skidding ball leaves the ground in a step.
 
     MuJoCo's contact impulse p minimises 1/2 p A p - p (v_wanted - v) over the cone: normal A = 1/m,
@@ -306,15 +306,10 @@ def soft_friction_model(preset: PhysicsPreset, share: float) -> mujoco.MjModel:
     """
     spec = build_spec(game.make_level(), preset)
     floor = next(geom for geom in spec.geoms if geom.name.startswith("solid_"))
-    spec.add_pair(
-        geomname1=floor.name,
-        geomname2="ball",
-        condim=3,
-        friction=[floor.friction[0], floor.friction[0], 0.0, 0.0, 0.0],
-        solref=list(floor.solref),
-        solimp=list(floor.solimp),
-        solreffriction=[0.0, -share / preset.dt_s],
-    )
+    pair = spec.add_pair(geomname1=floor.name, geomname2="ball", condim=3)
+    pair.friction = [floor.friction[0], floor.friction[0], 0.0, 0.0, 0.0]
+    pair.solref, pair.solimp = floor.solref, floor.solimp
+    pair.solreffriction = [0.0, -share / preset.dt_s]
     return spec.compile()
 
 
