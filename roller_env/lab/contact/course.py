@@ -46,8 +46,7 @@ class GameScene(scene.BallScene):
 
     level: str = "classic"
 
-    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
-        """Return the level with the default preset's contacts."""
+    def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
         spec = build_spec(_compiled(self.level).level, PRESETS["default"])
         method.configure(spec, dt_s)
         for name, value in scene.CONVERGED.items():
@@ -72,8 +71,7 @@ class GatePush(GameScene):
         lowering[compiled.gate_ctrl[0]] = -compiled.level.gates[0].speed
         return (0.5, pressing.tolist()), (self.horizon_s - 0.5, lowering.tolist())
 
-    def start(self, data: mujoco.MjData, dt_s: float) -> None:
-        """Put the ball to the gate."""
+    def _start(self, data: mujoco.MjData, dt_s: float) -> None:
         level = _compiled(self.level).level
         gate = level.gates[0]
         data.qpos[:2] = gate.at[0] - gate.size[0] / 2.0 - level.ball.radius, gate.at[1]

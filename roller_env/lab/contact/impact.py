@@ -57,12 +57,10 @@ class Bounce(scene.ContactScene):
         ratio = damping_ratio(self.elasticity)
         return -(self.frequency_rad_s**2), -2.0 * ratio * self.frequency_rad_s
 
-    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
-        """Return one ball."""
+    def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
         return falling_balls(method, dt_s, [scene.contact_of(0.0, self.solref)])
 
-    def start(self, data: mujoco.MjData, dt_s: float) -> None:
-        """Lift it."""
+    def _start(self, data: mujoco.MjData, dt_s: float) -> None:
         data.qpos[0] = self.height_m
 
     def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
@@ -144,12 +142,10 @@ class Restitution(scene.ContactScene):
     one-step contact does not reckon with (1 - B h becomes 1 / (1 + B h) > 0): it never bounces.
     """
 
-    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
-        """Return a ball for each elasticity, speed and arrival."""
+    def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
         return falling_balls(method, dt_s, [calibrated(e, method, dt_s) for e in ELASTICITY])
 
-    def start(self, data: mujoco.MjData, dt_s: float) -> None:
-        """Throw them so that the speed at the ground is the nominal one."""
+    def _start(self, data: mujoco.MjData, dt_s: float) -> None:
         data.qpos[:] = height = SPEED_M_S * dt_s * ARRIVAL
         data.qvel[:] = -np.sqrt(np.maximum(SPEED_M_S**2 - 2.0 * GRAVITY_M_S2 * height, 0.0))
 

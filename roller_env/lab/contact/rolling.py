@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import mujoco
 import numpy as np
@@ -37,21 +37,28 @@ SOFT_SOLREF: Final = (-(SOFT_TIME_CONSTANT_S**-2), -2.0 / SOFT_TIME_CONSTANT_S)
 """Critically damped, in MuJoCo's direct form, which ``refsafe`` leaves alone."""
 
 ROLLS_BELOW: Final = 0.02
-"""Fraction of the first slip below which a ball counts as rolling, extrapolated to none.
+"""Fraction of the first slip below which a ball counts as rolling, extrapolated to none. The game's
+soft friction takes all that the cone allows only while it wants more, which is the rate B = 216/s
+of the slip: above 7/2 mu g / B, 1.6 % of 3 m/s. Below, the slip dies out exponentially."""
 
-The game's soft friction takes all that the cone allows only while it wants more, which is the rate
-B = 216/s of the slip: above 7/2 mu g / B, 1.6 % of 3 m/s. Below, the slip dies out exponentially;
-at 1 % the ball would seem to roll 0.15 % too late with every method and step."""
+
+def resting_ball(
+    method: MujocoMethod, dt_s: float, contact: Mapping[str, Any], slope_deg: float = 0.0
+) -> mujoco.MjSpec:
+    """Return the game's ball at rest on a ground."""
+    spec = scene.new_spec(method, dt_s, GRAVITY_M_S2, impratio=IMPRATIO, **scene.CONVERGED)
+    angle = math.radians(slope_deg)
+    tilt = [math.cos(angle / 2.0), 0.0, math.sin(angle / 2.0), 0.0]
+    scene.add_ground(spec, quat=tilt, **contact)
+    height = RADIUS_M - scene.resting_depth(contact["solref"], GRAVITY_M_S2 * math.cos(angle))
+    at = (height * math.sin(angle), 0.0, height * math.cos(angle))
+    scene.add_ball(spec, at, RADIUS_M, MASS_KG)
+    return spec
 
 
 @dataclass(frozen=True)
 class SteadyRoll(scene.BallScene):
-    """A ball that a steady force sets rolling from rest.
-
-    Attributes:
-        slope_deg: of the ground, falling towards +x.
-        force_n: through the ball's centre, along +x; 0 on the slope.
-    """
+    """A ball that a force along +x, or a ground that falls towards +x, sets rolling from rest."""
 
     moments_s: Sequence[float] = (2.0,)
     reference_step_s: float = 2.0 / 7000.0
@@ -64,19 +71,10 @@ class SteadyRoll(scene.BallScene):
         pull = GRAVITY_M_S2 * math.sin(math.radians(self.slope_deg))
         return 5.0 / 7.0 * (pull + self.force_n / MASS_KG)
 
-    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
-        """Return the ball at rest on the slope."""
-        spec = scene.new_spec(method, dt_s, GRAVITY_M_S2, impratio=IMPRATIO, **scene.CONVERGED)
-        angle = math.radians(self.slope_deg)
-        tilt = [math.cos(angle / 2.0), 0.0, math.sin(angle / 2.0), 0.0]
-        scene.add_ground(spec, quat=tilt, **scene.contact_of(FRICTION, SOFT_SOLREF))
-        height = RADIUS_M - scene.resting_depth(SOFT_SOLREF, GRAVITY_M_S2 * math.cos(angle))
-        at = (height * math.sin(angle), 0.0, height * math.cos(angle))
-        scene.add_ball(spec, at, RADIUS_M, MASS_KG)
-        return spec
+    def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        return resting_ball(method, dt_s, scene.contact_of(FRICTION, SOFT_SOLREF), self.slope_deg)
 
-    def start(self, data: mujoco.MjData, dt_s: float) -> None:
-        """Push."""
+    def _start(self, data: mujoco.MjData, dt_s: float) -> None:
         data.xfrc_applied[1, 0] = self.force_n
 
     def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
@@ -96,12 +94,7 @@ class Skid(scene.BallScene):
     """A ball that is thrown along the ground without spin, skids, and begins to roll.
 
     The ground is the game's own at its default preset: in the soft contact of the other two, the
-    skid would last 6 % too long.
-
-    Attributes:
-        heading_deg: direction of the throw, from +x towards +y. MuJoCo aligns the pyramidal
-            cone's edges with the world's axes on level ground.
-        speed_m_s: of the throw.
+    skid would last 6 % too long. The heading is from +x towards +y.
     """
 
     methods: Sequence[Method] = (*MUJOCO, *PYRAMIDAL)
@@ -128,17 +121,10 @@ class Skid(scene.BallScene):
         braked = 0.5 * FRICTION * GRAVITY_M_S2 * skids**2
         return (self.speed_m_s * (skids + 5.0 / 7.0 * rolls) - braked) * self.direction
 
-    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
-        """Return the ball at rest on the ground."""
-        spec = scene.new_spec(method, dt_s, GRAVITY_M_S2, impratio=IMPRATIO, **scene.CONVERGED)
-        contact = scene.game_contact()
-        scene.add_ground(spec, **contact)
-        depth = scene.resting_depth(contact["solref"], GRAVITY_M_S2)
-        scene.add_ball(spec, (0.0, 0.0, RADIUS_M - depth), RADIUS_M, MASS_KG)
-        return spec
+    def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        return resting_ball(method, dt_s, scene.game_contact())
 
-    def start(self, data: mujoco.MjData, dt_s: float) -> None:
-        """Throw."""
+    def _start(self, data: mujoco.MjData, dt_s: float) -> None:
         data.qvel[:2] = self.speed_m_s * self.direction
 
     def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:

@@ -133,8 +133,7 @@ class MujocoTrial:
     """
 
     def __init__(self, scene: ContactScene, method: MujocoMethod, dt_s: float):
-        """Prepare a simulation of ``scene``."""
-        self.model = scene.world(method, dt_s).compile()
+        self.model = scene._world(method, dt_s).compile()
         self.data = mujoco.MjData(self.model)
         self._scene, self._method = scene, method
         self._plan = [(steps_of(seconds, dt_s), ctrl) for seconds, ctrl in scene.plan]
@@ -153,7 +152,7 @@ class MujocoTrial:
         """Simulate the whole motion and keep its path."""
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
-        self._scene.start(data, model.opt.timestep)
+        self._scene._start(data, model.opt.timestep)
         begins = np.cumsum([0, *(steps for steps, _ in self._plan)]).tolist()[:-1]
 
         def control(step: int) -> None:
@@ -238,10 +237,10 @@ class ContactScene(ABC):
     """Begin and end of what is timed, if that is not all."""
 
     @abstractmethod
-    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+    def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
         """Return the scene's bodies, ground and settings."""
 
-    def start(self, data: mujoco.MjData, dt_s: float) -> None:  # noqa: B027 - most fall or roll off
+    def _start(self, data: mujoco.MjData, dt_s: float) -> None:  # noqa: B027 - some just fall
         """Put the freshly reset data where the motion begins."""
 
     @property
@@ -256,16 +255,11 @@ class ContactScene(ABC):
 
 @dataclass(frozen=True)
 class BallScene(ContactScene):
-    """A scene whose first body is a free ball, which is somewhere else with every time step.
-
-    Attributes:
-        moments_s: when the ball's place is compared; the first is what the chart shows.
-        reference_step_s: of the converged model; no step of the scene's own, so that nothing is
-            compared with itself.
-    """
+    """A scene whose first body is a free ball, whose place is compared at ``moments_s``."""
 
     moments_s: Sequence[float] = ()
     reference_step_s: float = 4e-5
+    """Of the converged model; none of the scene's own, so that nothing is compared with itself."""
 
     def places(self, path: Path) -> Float64:
         """Return where the ball is at the scene's moments, (moments, 3) m."""

@@ -3,7 +3,7 @@
 SimBenchmark (Kang and Hwangbo, 2018, https://leggedrobotics.github.io/SimBenchmark, source at
 https://github.com/leggedrobotics/SimBenchmark, commit 3fd1764) compared RaiSim, Bullet, ODE, DART
 and MuJoCo 1.50. Its set-ups and measures are used here so that MuJoCo 4's rows can stand beside
-its published ones, of which `PUBLISHED` holds those that have a counterpart.
+its published ones, with which the tests compare them.
 
 Three things about them that are not on its pages: the direction called "xy" is 60 degrees from x,
 not 45. MuJoCo was left out of the bouncing test, since it has no coefficient of restitution; the
@@ -16,7 +16,8 @@ within 0.2 % at 10 ms and 3 % at 100 ms.
 Of SimBenchmark's solvers for MuJoCo it is CG here, as its sparse path is right in MuJoCo 4.0.0
 (Newton's Hessian is not), and dense matrices of 1296 degrees of freedom are several times slower.
 Contact parameters are MuJoCo's defaults, as there, but in the bouncing test. Cut, for time: steps
-below 1 ms (rolling, bouncing), 5 ms (666) and 10 ms (666 dropped).
+below 1 ms (rolling, bouncing), 5 ms (666) and 10 ms (666 dropped). Means over time are those of the
+beginnings of the steps.
 """
 
 from __future__ import annotations
@@ -24,12 +25,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path as File
 from typing import Any, Final
 
 import mujoco
 import numpy as np
-from pandas import read_csv
 from scipy.spatial.distance import pdist
 
 from roller_env.lab.contact import scene
@@ -39,11 +38,6 @@ from roller_env.lab.simulate import Float64, Path
 
 GRAVITY_M_S2: Final = 9.81
 """SimBenchmark's, unlike the game's."""
-
-PUBLISHED: Final = read_csv(File(__file__).with_suffix(".csv"))
-"""SimBenchmark's data without error reduction: ``test`` (the scene here that it belongs beside),
-``engine`` (with solver and integrator where there was a choice), ``dt_s``, ``error`` (its measure;
-infinite where it blew up) and ``wall_s`` (CPU seconds of 2018). From its ``data/*/*.csv``."""
 
 
 def benchmark_spec(method: MujocoMethod, dt_s: float, friction: float) -> mujoco.MjSpec:
@@ -61,11 +55,7 @@ def rubbing(friction: float) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Rolling(scene.ContactScene):
-    """A box that carries 25 balls is pushed hard enough to slide; the balls roll on it.
-
-    Attributes:
-        direction: (x, y) unit vector of the push.
-    """
+    """A box with 25 balls is pushed along ``direction`` so that it slides; the balls roll on it."""
 
     methods: Sequence[Method] = (*MUJOCO, *PYRAMIDAL)
     direction: tuple[float, float] = (0.0, 1.0)
@@ -90,8 +80,7 @@ class Rolling(scene.ContactScene):
 
     timed_s = (0.0, 0.2)
 
-    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
-        """Return the box on the ground and the balls on the box."""
+    def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
         spec = benchmark_spec(method, dt_s, self.ground_friction)
         half_edge, half_height, overlap = 10.0, 0.5, 2e-6
         box = spec.worldbody.add_body(pos=[0.0, 0.0, half_height - overlap])
@@ -108,15 +97,11 @@ class Rolling(scene.ContactScene):
                 scene.add_ball(spec, at, half_height, self.ball_kg, **rubbing(self.ball_friction))
         return spec
 
-    def start(self, data: mujoco.MjData, dt_s: float) -> None:
-        """Push the box."""
+    def _start(self, data: mujoco.MjData, dt_s: float) -> None:
         data.xfrc_applied[1, :2] = self.force_n * np.array(self.direction)
 
     def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
-        """Return the mean over time of the squared errors, (m/s)², of box's and first ball's speed.
-
-        The samples are those at the beginnings of the steps.
-        """
+        """Return the mean over time of the squared velocity errors of box and ball, (m/s)²."""
         squares = 0.0
         way = np.append(self.direction, 0.0)
         velocities = path.qvel[:-1, :3], path.qvel[:-1, 6:9]
@@ -144,8 +129,7 @@ class Bouncing(scene.ContactScene):
 
     timed_s = (0.0, 2.0)
 
-    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
-        """Return the balls over the ground."""
+    def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
         spec = benchmark_spec(method, dt_s, 0.0)
         contact = calibrated(1.0, method, dt_s)
         for x, y in np.ndindex(self.side, self.side):
@@ -154,10 +138,7 @@ class Bouncing(scene.ContactScene):
         return spec
 
     def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
-        """Return the mean over time of the squared error of the energy, J².
-
-        The samples are those at the beginnings of the steps.
-        """
+        """Return the mean over time of the squared error of the energy, J²."""
         height, velocity = path.qpos[:-1, 2::7], path.qvel[:-1].reshape(-1, self.side**2, 6)
         inertia = 0.4 * self.ball_kg * self.radius_m**2
         doubled = self.ball_kg * velocity[..., :3] ** 2 + inertia * velocity[..., 3:] ** 2
@@ -168,14 +149,10 @@ class Bouncing(scene.ContactScene):
 
 @dataclass(frozen=True)
 class SixSixSix(scene.ContactScene):
-    """A cube of 6 x 6 x 6 balls, a little disturbed, collapses; how deep do they overlap?
-
-    Attributes:
-        lowest_m: height of the lowest layer's centres, before the disturbance.
-        friction: of every contact.
-    """
+    """A cube of 6 x 6 x 6 balls, a little disturbed, collapses; how deep do they overlap?"""
 
     lowest_m: float = 0.101
+    """Height of the lowest layer's centres, before the disturbance."""
     friction: float = 0.0
 
     side = 6
@@ -193,8 +170,7 @@ class SixSixSix(scene.ContactScene):
     timed_s = (1.0, 1.5)
     """While the pile falls apart."""
 
-    def world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
-        """Return the cube over the ground."""
+    def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
         spec = benchmark_spec(method, dt_s, self.friction)
         # Deep piles have many contacts at large steps.
         spec.memory = 2**28
@@ -208,10 +184,7 @@ class SixSixSix(scene.ContactScene):
         return spec
 
     def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
-        """Return the mean over time of the squared penetration, m², and as it was published.
-
-        The samples are those at the beginnings of the steps.
-        """
+        """Return the mean over time of the squared penetration, m², and as it was published."""
         places = path.qpos[:-1].reshape(len(path.qpos) - 1, -1, 7)[:, :, :3]
         squares = np.array([squared_penetration(one, self.radius_m) for one in places])
         published = np.array([self.empty_sample_m2, *squares[1:]])

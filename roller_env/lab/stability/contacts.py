@@ -289,11 +289,10 @@ def hop_speed(dt_s: float, share: float = DAMPING_STEPS) -> float:
     """Return the speed, m/s, with which the game's skidding ball leaves the ground in a step.
 
     MuJoCo's contact impulse p minimises 1/2 p A p - p (v_wanted - v) over the cone: normal A = 1/m,
-    tangential A = 7/2 / m on a sphere that can roll. The contact wants to remove ``share`` of the
-    slip, and gravity. On the cone p_t = mu p_n, so that p_n / m = (g h + mu s) / (1 + 7/2 mu²)
-    with s = share · slip, of which gravity takes g h. It does not depend on the step otherwise.
-
-    Source: Anitescu 2006, "Optimization-based simulation of nonsmooth rigid multibody dynamics".
+    tangential A = 7/2 / m on a sphere that can roll. It wants to remove ``share`` of the slip, s,
+    and gravity. On the cone p_t = mu p_n, so that p_n / m = (g h + mu s) / (1 + 7/2 mu²), of which
+    gravity takes g h (Anitescu 2006, "Optimization-based simulation of nonsmooth rigid multibody
+    dynamics").
     """
     mu, weight = game.FRICTION, game.GRAVITY_M_S2 * dt_s
     return (weight + mu * share * HOP_M_S) / (1.0 + 3.5 * mu**2) - weight

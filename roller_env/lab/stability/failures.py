@@ -56,14 +56,9 @@ class Setting(NamedTuple):
         return float(stages / self.model.opt.timestep)
 
 
-class Failure(NamedTuple):
-    """A quantity of a path, (S + 1,), and the setting that fails, then those that cure it.
-
-    The greatest value of the quantity tells failed from cured.
-    """
-
-    quantity: Callable[[Path], Float64]
-    settings: Sequence[Setting]
+Failure = tuple[Callable[[Path], Float64], Sequence[Setting]]
+"""A quantity of a path, (S + 1,), whose greatest value tells failed from cured; and the setting
+that fails, then those that cure it."""
 
 
 def time_ratios(settings: Sequence[Setting], seconds: float, repeats: int) -> list[float]:
@@ -101,19 +96,10 @@ def rows(name: str, repeats: int) -> tuple[list[dict[str, Any]], list[Curve]]:
         curves.append((path.time[counts], quantity(path)[counts]))
         value, role = float(curves[-1][1].max()), "cures" if found else "fails"
         verdict = "holds" if value <= words["acceptable"] else "fails"
-        found.append(
-            {
-                "case": name,
-                "setting": setting.label,
-                "role": role,
-                "value": value,
-                "verdict": verdict,
-                "good": (verdict == "fails") == (role == "fails"),
-                "time_ratio": ratio,
-                "evaluations_ratio": setting.evaluations_per_s / settings[0].evaluations_per_s,
-                **words,
-            }
-        )
+        row = words | {"case": name, "setting": setting.label, "role": role, "value": value}
+        row |= {"verdict": verdict, "good": (verdict == "fails") == (role == "fails")}
+        evaluations = setting.evaluations_per_s / settings[0].evaluations_per_s
+        found.append(row | {"time_ratio": ratio, "evaluations_ratio": evaluations})
     return found, curves
 
 
@@ -175,20 +161,17 @@ def _unlimited(compiled: CompiledLevel) -> CompiledLevel:
 
 def blow_up() -> Failure:
     """Return the gate's servo, whose damper plain Euler takes from before the step."""
-    gate = load_level("gate")
+    gate, euler = load_level("gate"), replace(DEFAULT, integrator="Euler")
     address = int(compile_level(gate, DEFAULT).gate_qpos[0])
 
     def setting(label: str, preset: PhysicsPreset) -> Setting:
         compiled = _unlimited(compile_level(gate, preset))
         return _course(label, compiled, gate.start.at, movers_m_s=-GATE_SPEED_M_S)
 
-    return Failure(
-        lambda path: 1e3 * np.abs(path.qpos[:, address] + GATE_SPEED_M_S * path.time),
-        (
-            setting("Euler, 1/240 s", replace(DEFAULT, integrator="Euler")),
-            setting("implicitfast, 1/240 s", DEFAULT),
-            setting("Euler, 1/480 s", replace(DEFAULT, integrator="Euler", dt_s=1 / 480)),
-        ),
+    return lambda path: 1e3 * np.abs(path.qpos[:, address] + GATE_SPEED_M_S * path.time), (
+        setting("Euler, 1/240 s", euler),
+        setting("implicitfast, 1/240 s", DEFAULT),
+        setting("Euler, 1/480 s", replace(euler, dt_s=1 / 480)),
     )
 
 
@@ -200,13 +183,10 @@ def tunnelling() -> Failure:
         model = ball_on_box(EULER, dt_s, solref=(tau_s, 1.0), thickness=WALL_M, **options)
         return Setting(label, model, thrown(10.2 * speed * dt_s, -speed))
 
-    return Failure(
-        lambda path: -1e3 * path.qpos[:, 2],
-        (
-            setting("tau = 20 ms", TAU_S),
-            setting("tau = 20 ms, speculative contacts", TAU_S, enableflags=contacts.SPECULATIVE),
-            setting("tau = 5 ms", 0.005),
-        ),
+    return lambda path: -1e3 * path.qpos[:, 2], (
+        setting("tau = 20 ms", TAU_S),
+        setting("tau = 20 ms, speculative contacts", TAU_S, enableflags=contacts.SPECULATIVE),
+        setting("tau = 5 ms", 0.005),
     )
 
 
@@ -218,12 +198,9 @@ def bent_heading() -> Failure:
         heading = np.degrees(np.arctan2(path.qvel[:, 1], path.qvel[:, 0]))
         return np.asarray(np.abs(heading - angle_deg))
 
-    return Failure(
-        turned,
-        (
-            _skid("pyramidal cone", replace(DEFAULT, cone="pyramidal"), angle_deg),
-            _skid("elliptic cone", DEFAULT, angle_deg),
-        ),
+    return turned, (
+        _skid("pyramidal cone", replace(DEFAULT, cone="pyramidal"), angle_deg),
+        _skid("elliptic cone", DEFAULT, angle_deg),
     )
 
 
@@ -241,12 +218,9 @@ def restitution_gain() -> Failure:
         return np.asarray(np.maximum(height, 1e-4) / drop)
 
     said = "direct form of the same bounce: ({:.0f}, {:.0f})".format(*direct.solref)
-    return Failure(
-        energy,
-        (
-            setting("solref = (0.02, 0.1)", solref=(TAU_S, ratio)),
-            setting(said, solref=direct.solref, impedance=direct.solimp[0]),
-        ),
+    return energy, (
+        setting("solref = (0.02, 0.1)", solref=(TAU_S, ratio)),
+        setting(said, solref=direct.solref, impedance=direct.solimp[0]),
     )
 
 
@@ -263,12 +237,9 @@ def seam_bump() -> Failure:
         rest = np.median(path.qpos[path.time > SETTLE_S, 2])
         return np.asarray(1e3 * (path.qpos[:, 2] - rest))
 
-    return Failure(
-        bump,
-        (
-            setting("tiles with seams", seams=True),
-            setting("merged into one box", seams=False),
-        ),
+    return bump, (
+        setting("tiles with seams", seams=True),
+        setting("merged into one box", seams=False),
     )
 
 
@@ -277,32 +248,21 @@ def crush() -> Failure:
     level = hanging_gate_level(0.0)
     limited, unlimited = compile_level(level, DEFAULT), _unlimited(compile_level(level, DEFAULT))
     address = int(limited.gate_qpos[0])
-    return Failure(
-        lambda path: 100.0 * (1.0 - (path.qpos[:, address] + 1.2) / (2.0 * RADIUS_M)),
-        (
-            _course("servo without limit", unlimited, movers_m_s=-GATE_SPEED_M_S),
-            _course("the game's servo, at most 10 kN", limited, movers_m_s=-GATE_SPEED_M_S),
-        ),
+    return lambda path: 100.0 * (1.0 - (path.qpos[:, address] + 1.2) / (2.0 * RADIUS_M)), (
+        _course("servo without limit", unlimited, movers_m_s=-GATE_SPEED_M_S),
+        _course("the game's servo, at most 10 kN", limited, movers_m_s=-GATE_SPEED_M_S),
     )
 
 
-HOP_FRICTION_STEPS: Final = 0.3
-"""B h of the friction that cures the hop: the share of the slip that one step removes."""
-
-
 def hop() -> Failure:
-    """Return a skidding ball that hops."""
+    """Return a skidding ball that hops; B h is the share of the slip that one step removes."""
     default = _skid("default, 1/240 s", DEFAULT)
-    soft = contacts.soft_friction_model(DEFAULT, HOP_FRICTION_STEPS)
-    said = f"friction's own damper, B h = {HOP_FRICTION_STEPS:g}"
-    return Failure(
-        lambda path: 1e3 * (path.qpos[:, 2] - RADIUS_M),
-        (
-            default,
-            Setting(said, soft, default.prepare),
-            _skid("RK4, 1/240 s", replace(DEFAULT, integrator="RK4")),
-            _skid("accurate: RK4, 1/960 s", PRESETS["accurate"]),
-        ),
+    soft = contacts.soft_friction_model(DEFAULT, 0.3)
+    return lambda path: 1e3 * (path.qpos[:, 2] - RADIUS_M), (
+        default,
+        Setting("friction's own damper, B h = 0.3", soft, default.prepare),
+        _skid("RK4, 1/240 s", replace(DEFAULT, integrator="RK4")),
+        _skid("accurate: RK4, 1/960 s", PRESETS["accurate"]),
     )
 
 
