@@ -2,9 +2,9 @@
 
 The product scales its contacts with the time step; a curve of errors over steps needs one model.
 So the levels are compiled once with the default preset's contacts, and only the integrator and the
-step vary. Contact damping times h reaches 2 at h = 9.3 ms, and the movers' servos (200 rad/s,
-critically damped) take Euler to 4.1 ms, RK4 to 13.9 ms and implicitfast to 24 ms. Every impact is
-first order for every method, and after a few the ball's path is a matter of chance.
+step vary. Contact damping times h reaches 2 at h = 9.3 ms, and the movers' servos (200 rad/s) take
+Euler to 4.1 ms, RK4 to 13.9 ms and implicitfast to 24 ms. After a few impacts the ball's path is a
+matter of chance.
 """
 
 from __future__ import annotations
@@ -30,9 +30,6 @@ from roller_env.physics.presets import PRESETS
 
 CONTROL_DT_S: Final = 0.05
 """Between changes of the keys: the environments' default."""
-
-Keys = tuple[tuple[str, float], ...]
-"""Keys of ``wasd``, and for how many seconds they are held."""
 
 
 @cache
@@ -79,14 +76,14 @@ class GatePush(GameScene):
 
 @dataclass(frozen=True)
 class Course(GameScene):
-    """The classic level under a sequence of keys.
+    """The classic level under keys of ``wasd``, each held for some seconds.
 
     They are played once through the product's own simulation, rules and all, at its ``accurate``
     preset. What its actuators did is then repeated open loop, so that events which are quantised to
     control steps fall alike with every method.
     """
 
-    keys: Keys = (("w", 1.5), ("wa", 0.5), ("a", 0.5), ("s", 1.5))
+    keys: tuple[tuple[str, float], ...] = (("w", 1.5), ("wa", 0.5), ("a", 0.5), ("s", 1.5))
 
     @property
     def plan(self) -> scene.Plan:
@@ -95,7 +92,7 @@ class Course(GameScene):
 
 
 @cache
-def played_plan(level: str, keys: Keys) -> scene.Plan:
+def played_plan(level: str, keys: tuple[tuple[str, float], ...]) -> scene.Plan:
     """Play keys through the product's simulation, and return what its actuators did."""
     settings = {"physics": "accurate", "control_dt_s": CONTROL_DT_S, "num_threads": 1}
     config = make_config(level=load_level(level), **settings)

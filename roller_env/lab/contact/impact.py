@@ -30,9 +30,7 @@ def falling_balls(
     scene.add_ground(spec, condim=1, contype=0, conaffinity=1)
     for number, contact in enumerate(contacts):
         at = (2.0 * number, 0.0, RADIUS_M)
-        scene.add_ball(
-            spec, at, RADIUS_M, MASS_KG, scene.UPWARDS, contype=1, conaffinity=0, **contact
-        )
+        scene.add_ball(spec, at, RADIUS_M, MASS_KG, scene.UPWARDS, conaffinity=0, **contact)
     return spec
 
 
@@ -43,13 +41,12 @@ class Bounce(scene.ContactScene):
     *Discretisation* is the distance from the contact's own law (`soft_bounce`): the step that
     touching falls into is wrong to first order with every method, RK4 included, since none looks
     for the event. So one run has the luck of where in a step the ball touches. *Model* is the
-    distance from a rigid ball that loses 1 - ``elasticity`` of its speed at once. The spring's
-    frequency is the undamped one; Euler's limit is h = 2 / frequency.
+    distance from a rigid ball that loses 1 - ``elasticity`` of its speed at once.
     """
 
     height_m: float = 1.0
     elasticity: float = 0.8
-    frequency_rad_s: float = 200.0
+    frequency_rad_s: float = 200.0  # Of the spring, undamped; Euler's limit is h = 2 / frequency.
 
     @property
     def solref(self) -> tuple[float, float]:
@@ -166,10 +163,9 @@ def calibrated(elasticity: float, method: MujocoMethod, dt_s: float) -> dict[str
 
 
 def returned_speed(path: Path) -> Float64:
-    """Return the speeds, (balls,) m/s, at which balls leave the ground after their first impact.
+    """Return the speeds, (balls,) m/s, at which balls leave the ground first; 0 for one that stays.
 
-    From the first sample in which a ball is off the ground again and rising, less what gravity has
-    taken since it left: sqrt(v² + 2 g z). 0 for a ball that stays.
+    Of the first sample in which it is off the ground and rising, with what gravity has taken since.
     """
     height, velocity = path.qpos, path.qvel
     touched = np.logical_or.accumulate(height < 0.0, axis=0)

@@ -1,12 +1,11 @@
 """A ball on the level and on a slope, pushed, rolling and skidding.
 
-What is expected, all of it held by the tests: every integrator of the Euler family takes the
-velocity at the end of a step for the whole step, so a ball that is pushed from rest or rolls down a
-slope is ahead by h / T, whatever the force. RK4 has no such error. MuJoCo puts the contact of a
-ball that rests a depth delta in the ground half way, so it rolls on a lever shortened by delta / 2,
-which is worth (2/7) delta / r. A skid ends after 2 v0 / (7 mu g) at every heading, give or take a
-hop, at 5/7 of its velocity. The pyramidal cone's edges are the world's axes: at 45 degrees its
-friction is mu / sqrt(2), and between it bends the path.
+What is expected, all of it held by the tests: the Euler family takes the velocity at the end of a
+step for the whole step, so a ball that rolls from rest is ahead by h / T, whatever the force. RK4
+has no such error. MuJoCo puts the contact of a ball that rests a depth delta in the ground half
+way, so it rolls on a lever shortened by delta / 2, which is worth (2/7) delta / r. A skid ends
+after 2 v0 / (7 mu g), give or take a hop, at 5/7 of its velocity. The pyramidal cone's edges are
+the world's axes: at 45 degrees its friction is mu / sqrt(2), and between it bends the path.
 """
 
 from __future__ import annotations
@@ -141,8 +140,7 @@ class Skid(scene.BallScene):
 def roll_time(path: Path) -> float:
     """Return when a thrown ball begins to roll, seconds; infinite where it never does.
 
-    Friction takes the slip away evenly, so the moment at which `ROLLS_BELOW` of it is left,
-    interpolated between two steps, tells when none would be.
+    Friction takes the slip away evenly, so when `ROLLS_BELOW` of it is left tells when none is.
     """
     slip = slip_speed(path)
     threshold = ROLLS_BELOW * slip[0]

@@ -119,10 +119,10 @@ def steps_of(seconds: float, dt_s: float) -> int:
     return steps
 
 
-_STATE: Final = mujoco.mjtState.mjSTATE_INTEGRATION
-
 Plan = Sequence[tuple[float, Sequence[float]]]
 """Seconds, and MuJoCo's controls, (nu,), that are held so long, one after the other."""
+
+_STATE: Final = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 class MujocoTrial:
@@ -205,10 +205,9 @@ def described(scene: str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class ContactScene(ABC):
-    """A scene that MuJoCo simulates; see `roller_env.lab.scene.Scene`.
+    """A `roller_env.lab.scene.Scene` that MuJoCo simulates.
 
-    Contact parameters never follow the time step where an error is called discretisation: at every
-    step, and for the reference, it is the same soft contact.
+    Where an error is called discretisation, the contact is the same soft one at every step.
     """
 
     name: str

@@ -23,9 +23,8 @@ from roller_env.lab.game import GATE_SPEED_M_S, RADIUS_M, Course, make_level
 from roller_env.lab.runner import interleaved, timed
 from roller_env.lab.simulate import Float64, Path, Start, record, settled, started
 from roller_env.lab.stability import contacts
-from roller_env.lab.stability.contacts import SETTLE_S, TAU_S, WALL_M, ball_on_box, thrown
+from roller_env.lab.stability.contacts import EULER, SETTLE_S, TAU_S, WALL_M, ball_on_box, thrown
 from roller_env.lab.stability.limits import words
-from roller_env.lab.stability.smooth import EULER
 from roller_env.level import Level, load_level
 from roller_env.physics.materials import contact_parameters, restitution
 from roller_env.physics.presets import PRESETS, PhysicsPreset
@@ -34,9 +33,6 @@ from roller_env.units import quants
 DEFAULT: Final = PRESETS["default"]
 
 WORDS: Final = words("failures", after_s=-1.0)
-
-TIMED_RUNS: Final = 10
-"""Simulations that are timed together: a single one is too short for the clock."""
 
 Curve = tuple[Float64, Float64]
 """Times, s, and a quantity at each."""
@@ -49,12 +45,6 @@ class Setting(NamedTuple):
     model: mujoco.MjModel
     prepare: Start
 
-    @property
-    def evaluations_per_s(self) -> float:
-        """Evaluations of the forces for a simulated second."""
-        stages = 4 if self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
-        return float(stages / self.model.opt.timestep)
-
 
 Failure = tuple[Callable[[Path], Float64], Sequence[Setting]]
 """A quantity of a path, (S + 1,), whose greatest value tells failed from cured; and the setting
@@ -62,14 +52,11 @@ that fails, then those that cure it."""
 
 
 def time_ratios(settings: Sequence[Setting], seconds: float, repeats: int) -> list[float]:
-    """Return each setting's time over the first's: medians of ratios of interleaved runs.
-
-    It is the time of this thread's own processor: MuJoCo uses one thread, so on a machine that is
-    quiet that is the wall time, and on one that is not it is still the method's.
-    """
+    """Return each setting's CPU time over the first's: medians of ratios of interleaved runs."""
 
     def run(setting: Setting) -> None:
-        for _ in range(TIMED_RUNS):
+        # A single one is too short for the clock.
+        for _ in range(10):
             settled(setting.model, seconds, setting.prepare)
 
     turns = {one.label: partial(timed, partial(run, one), time.thread_time) for one in settings}
@@ -78,12 +65,10 @@ def time_ratios(settings: Sequence[Setting], seconds: float, repeats: int) -> li
 
 
 def rows(name: str, repeats: int) -> tuple[list[dict[str, Any]], list[Curve]]:
-    """Return a row and a curve for each setting of a failure.
+    """Return a row for each setting of a failure, and what the quantity did where it counts.
 
-    Returns:
-        ``case``, ``setting``, its ``role`` (fails or cures), the ``value``, the ``verdict`` (fails
-        or holds) and whether that is ``good``, ``time_ratio`` and ``evaluations_ratio`` to
-        the failing setting, and the case's words; and what the quantity did where it counts.
+    The case's words, the ``setting``, its ``role`` (fails or cures), ``value``, ``verdict`` (fails
+    or holds) and whether that is ``good``; its time and evaluations of the forces over the first's.
     """
     words, (quantity, settings) = WORDS[name], FAILURES[name]()
     ratios = time_ratios(settings, words["seconds"], repeats)
@@ -98,7 +83,8 @@ def rows(name: str, repeats: int) -> tuple[list[dict[str, Any]], list[Curve]]:
         verdict = "holds" if value <= words["acceptable"] else "fails"
         row = words | {"case": name, "setting": setting.label, "role": role, "value": value}
         row |= {"verdict": verdict, "good": (verdict == "fails") == (role == "fails")}
-        evaluations = setting.evaluations_per_s / settings[0].evaluations_per_s
+        stages = 4 if setting.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
+        evaluations = stages * settings[0].model.opt.timestep / setting.model.opt.timestep
         found.append(row | {"time_ratio": ratio, "evaluations_ratio": evaluations})
     return found, curves
 
@@ -138,11 +124,8 @@ def hanging_gate_level(stop_m: float) -> Level:
     return gate_level({"at": (0.0, 0.0, 2.5), "size": size, "lowers_to": 1.3 + stop_m})
 
 
-ON_THE_FLOOR: Final = (0.0, 0.0, RADIUS_M)
-
-
 def _course(
-    label: str, compiled: CompiledLevel, at: Sequence[float] = ON_THE_FLOOR, **motion: Any
+    label: str, compiled: CompiledLevel, at: Sequence[float] = (0.0, 0.0, RADIUS_M), **motion: Any
 ) -> Setting:
     return Setting(label, compiled.model, Course(compiled, at, **motion).prepare)
 
@@ -193,12 +176,7 @@ def tunnelling() -> Failure:
 def bent_heading() -> Failure:
     """Return a skid that the pyramidal cone bends."""
     angle_deg = 22.5
-
-    def turned(path: Path) -> Float64:
-        heading = np.degrees(np.arctan2(path.qvel[:, 1], path.qvel[:, 0]))
-        return np.asarray(np.abs(heading - angle_deg))
-
-    return turned, (
+    return lambda path: np.abs(np.degrees(np.arctan2(*path.qvel[:, 1::-1].T)) - angle_deg), (
         _skid("pyramidal cone", replace(DEFAULT, cone="pyramidal"), angle_deg),
         _skid("elliptic cone", DEFAULT, angle_deg),
     )

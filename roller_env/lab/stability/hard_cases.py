@@ -196,11 +196,10 @@ READERS: Final[dict[str, Callable[[Sequence[Run]], float]]] = {
 
 
 def rows(name: str, effort: Effort) -> list[dict[str, Any]]:
-    """Return a case's rows under every preset.
+    """Return a case's requirements under every ``preset``.
 
-    Returns:
-        A requirement's columns, the ``preset``, its ``value``, the ``verdict`` (holds or fails),
-        whether that is ``good``, and how many ``starts`` it is the worst of.
+    With the ``value``, the worst of so many ``starts``, the ``verdict`` (holds or fails) and
+    whether that is ``good``.
     """
     found = []
     for preset in PRESETS.values():

@@ -34,19 +34,14 @@ EXACT: Final = (0.99, 1.01)
 """Band of measured / predicted where the formula is exact."""
 
 REACH: Final = 1.3
-"""How far on either side of a guess the threshold is looked for first."""
-
 FARTHEST: Final = 1e4
-"""How far off a guess may be."""
+"""How far on either side of a guess the threshold is looked for, first and at most."""
 
 
 def locate(holds: Callable[[float], bool], guess: float, tolerance: float) -> float:
-    """Return the value near ``guess``, or far from it, above which ``holds`` no longer does.
+    """Return the threshold near ``guess``, or far from it, above which ``holds`` no longer does.
 
-    Args:
-        holds: must hold below one threshold and fail above it.
-        guess: positive.
-        tolerance: relative width of the bracket, of which the geometric middle is returned.
+    It is the geometric middle of a bracket whose relative width is the ``tolerance``.
 
     Raises:
         ValueError: a guess or tolerance that makes no sense, or a threshold that is more than

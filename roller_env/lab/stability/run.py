@@ -33,10 +33,8 @@ class Results(NamedTuple):
 def select(only: Sequence[str], effort: Effort) -> list[tuple[str, str]]:
     """Return the sections and names of the cases that ``only`` names, in the order of the tables.
 
-    Args:
-        only: sections, groups of limits, limits, failures or hard cases; none means everything. A
-            name that is both a group and a failure ("tunnelling") means both.
-        effort: a quick one leaves out the slow limits, unless they are named themselves.
+    It names sections, groups of limits, limits, failures or hard cases; none means everything. A
+    quick ``effort`` leaves out the slow limits, unless they are named themselves.
 
     Raises:
         ValueError: a name that nothing has; the message has the nearest one.

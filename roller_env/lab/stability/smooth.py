@@ -12,20 +12,12 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.optimize import brentq
 
+from roller_env import rigid_body
 from roller_env.lab.contact.scene import UPWARDS, add_ball, new_spec
 from roller_env.lab.methods import MUJOCO, MujocoMethod
 from roller_env.lab.simulate import stays
 from roller_env.lab.stability.limits import Case, Effort, Limit, Quantity
-from roller_env.rigid_body import (
-    INTEGRATORS,
-    Body,
-    Integrator,
-    State,
-    Wrench,
-    advance,
-    linear_drag,
-    trajectory,
-)
+from roller_env.rigid_body import INTEGRATORS, Body, Integrator, State, Wrench, trajectory
 from roller_env.rigid_body.integrators import RungeKutta4, Splitting
 
 EULER, _, IMPLICITFAST, DISCRETE, RK4 = MUJOCO
@@ -84,9 +76,8 @@ def drag_limit(method: Integrator) -> float:
 def rk4_aliasing() -> float:
     """Return h w at which the report's Runge-Kutta step, which is late, has turned half round.
 
-    About a fixed axis the quaternion is a complex number, whose rate is i w/2 times itself; its
-    points are scaled to 1 inside the step as well. It has turned a right angle where its real part
-    is 0.
+    About a fixed axis the quaternion is a complex number of the rate i w/2 times itself, scaled to
+    1 inside the step as well. It has turned a right angle where its real part is 0.
     """
 
     def real_part(phase: float) -> float:
@@ -123,7 +114,7 @@ def _servo(
 
 def _our_drag(method: Integrator, _effort: Effort, phase: float) -> bool:
     state = State.create(Body.cube(1.0, 1.0), velocity=(1.0, 0.0, 0.0))
-    motion = trajectory(state, method, 1.0, OUR_STEPS, load=linear_drag(phase))
+    motion = trajectory(state, method, 1.0, OUR_STEPS, load=rigid_body.linear_drag(phase))
     return all(abs(reached.velocity[0, 0]) <= 1.0 for reached in motion)
 
 
@@ -173,7 +164,7 @@ def _norm(_effort: Effort, phase: float) -> bool:
 
 def _our_turn(method: str, _effort: Effort, phase: float) -> bool:
     """Say whether a step, read as the shortest turn between two poses, has the spin's sense."""
-    end = advance(_spinning(phase), INTEGRATORS[method], 1.0, 1)
+    end = rigid_body.advance(_spinning(phase), INTEGRATORS[method], 1.0, 1)
     return bool(end.rotation[0, 0] * end.rotation[0, 3] > 0.0)
 
 
