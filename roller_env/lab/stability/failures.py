@@ -64,27 +64,31 @@ def time_ratios(settings: Sequence[Setting], seconds: float, repeats: int) -> li
     return [statistics.median(np.divide(own, first)) for own in taken]
 
 
+def _evaluations_per_s(model: mujoco.MjModel) -> float:
+    rk4 = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
+    return float((4 if rk4 else 1) / model.opt.timestep)
+
+
 def rows(name: str, repeats: int) -> tuple[list[dict[str, Any]], list[Curve]]:
     """Return a row for each setting of a failure, and what the quantity did where it counts.
 
     The case's words, the ``setting``, its ``role`` (fails or cures), ``value``, ``verdict`` (fails
     or holds) and whether that is ``good``; its time and evaluations of the forces over the first's.
     """
-    words, (quantity, settings) = WORDS[name], FAILURES[name]()
-    ratios = time_ratios(settings, words["seconds"], repeats)
+    case, (quantity, settings) = WORDS[name], FAILURES[name]()
+    ratios = time_ratios(settings, case["seconds"], repeats)
     found: list[dict[str, Any]] = []
     curves: list[Curve] = []
     for setting, ratio in zip(settings, ratios, strict=True):
-        steps = round(words["seconds"] / setting.model.opt.timestep)
+        steps = round(case["seconds"] / setting.model.opt.timestep)
         path = record(setting.model, started(setting.model, setting.prepare), steps)
-        counts = path.time > words["after_s"]
+        counts = path.time > case["after_s"]
         curves.append((path.time[counts], quantity(path)[counts]))
         value, role = float(curves[-1][1].max()), "cures" if found else "fails"
-        verdict = "holds" if value <= words["acceptable"] else "fails"
-        row = words | {"case": name, "setting": setting.label, "role": role, "value": value}
+        verdict = "holds" if value <= case["acceptable"] else "fails"
+        row = case | {"case": name, "setting": setting.label, "role": role, "value": value}
         row |= {"verdict": verdict, "good": (verdict == "fails") == (role == "fails")}
-        stages = 4 if setting.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4 else 1
-        evaluations = stages * settings[0].model.opt.timestep / setting.model.opt.timestep
+        evaluations = _evaluations_per_s(setting.model) / _evaluations_per_s(settings[0].model)
         found.append(row | {"time_ratio": ratio, "evaluations_ratio": evaluations})
     return found, curves
 
@@ -105,13 +109,8 @@ def seam_level(*, seams: bool) -> Level:
 
 def gate_level(gate: dict[str, Any], **pieces: Any) -> Level:
     """Return a level with a gate, and far away the plate that opens it."""
-    plate = {
-        "name": "plate",
-        "at": (-30.0, 0.0, 0.0),
-        "size": (1.0, 1.0, 0.6),
-        "opens": ["gate"],
-        "sinks_to": -0.5,
-    }
+    plate: dict[str, Any] = {"name": "plate", "opens": ["gate"], "sinks_to": -0.5}
+    plate |= {"at": (-30.0, 0.0, 0.0), "size": (1.0, 1.0, 0.6)}
     return make_level(gates=[{"name": "gate"} | gate], plates=[plate], **pieces)
 
 
