@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from roller_env.lab.runner import provenance
 from roller_env.lab.stability import run
-from roller_env.lab.stability.cases import FULL, QUICK
+from roller_env.lab.stability.limits import FULL, QUICK
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,13 +45,8 @@ def main(arguments: Arguments) -> None:
         sys.exit(f"error: {error}")
     results = run.run(selection, effort, _progress)
     written = run.write(results, provenance(), arguments.out)
-    for rows, table in (
-        (results.limits, run.limits_table),
-        (results.failures, run.failures_table),
-        (results.hard_cases, run.hard_cases_table),
-    ):
-        if rows:
-            print(table(results))
+    for section, table in results.tables.items():
+        print(run.page(section, table))
     print(*run.summary(results), sep="\n")
     print(f"{len(written)} files in {arguments.out}")
 

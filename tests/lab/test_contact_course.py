@@ -11,12 +11,9 @@ import pytest
 from roller_env.game.actions import KEY_FORCE_N
 from roller_env.lab.contact.course import (
     COURSE,
-    DRIVE,
-    GAME_SCENES,
     GATE_PUSH,
     GameScene,
-    Pressed,
-    played_controls,
+    played_plan,
 )
 from roller_env.lab.contact.scene import ContactScene
 from roller_env.lab.methods import MUJOCO, MujocoMethod, without_warnings
@@ -39,17 +36,17 @@ def until(scene: GameSceneType, moment_s: float) -> GameSceneType:
 
 def test_the_keys_go_through_the_games_rules() -> None:
     """They push, and the plate that the ball is driven onto sinks."""
-    controls = played_controls("classic", DRIVE)
-    assert sum(one.seconds for one in controls) == pytest.approx(COURSE.horizon_s)
-    force = np.array([one.ctrl[:2] for one in controls])
+    plan = played_plan("classic", COURSE.keys)
+    assert sum(seconds for seconds, _ in plan) == pytest.approx(COURSE.horizon_s)
+    force = np.array([ctrl[:2] for _, ctrl in plan])
     np.testing.assert_allclose(np.unique(force), [-KEY_FORCE_N, 0.0, KEY_FORCE_N])
-    movers = np.array([one.ctrl[3:] for one in controls])
+    movers = np.array([ctrl[3:] for _, ctrl in plan])
     assert not movers[0].any()
     assert (movers[-1] < 0.0).any()
 
 
 def test_before_any_impact_the_euler_family_is_ahead_by_h_over_t_and_rk4_is_exact() -> None:
-    drive = until(replace(COURSE, keys=(Pressed("w", 1.0),)), 1.0)
+    drive = until(replace(COURSE, keys=(("w", 1.0),)), 1.0)
     way = 0.5 * KEY_FORCE_N / 1.4
     for method in MUJOCO:
         error = drive.trial(method, 0.002).errors()["position"]
@@ -80,7 +77,7 @@ def test_the_ball_is_pressed_against_the_gate_until_it_has_sunk() -> None:
     assert x[-1] - x[0] > 0.2
 
 
-@pytest.mark.parametrize("scene", GAME_SCENES, ids=lambda scene: scene.name)
+@pytest.mark.parametrize("scene", [GATE_PUSH, COURSE], ids=lambda scene: scene.name)
 def test_the_contacts_are_the_same_at_every_step(scene: ContactScene) -> None:
     models = [scene.trial(MujocoMethod("RK4"), dt_s).model for dt_s in (0.005, 0.001)]
     np.testing.assert_array_equal(models[0].geom_solref, models[1].geom_solref)

@@ -12,13 +12,12 @@ from roller_env.lab.contact.impact import (
     BOUNCE,
     ELASTICITIES,
     RESTITUTION,
-    add_falling_ball,
-    add_ground,
+    falling_balls,
     returned_speed,
     rigid_bounce,
     soft_bounce,
 )
-from roller_env.lab.contact.scene import contact_of, new_spec
+from roller_env.lab.contact.scene import contact_of
 from roller_env.lab.game import GRAVITY_M_S2
 from roller_env.lab.methods import MUJOCO, MujocoMethod
 from roller_env.lab.simulate import Path
@@ -105,11 +104,9 @@ def test_an_impact_is_wrong_by_what_its_first_step_misses_of_the_damper(integrat
     """
     dt_s, speed = 2e-5, 4.0
     parts = (np.arange(30) + 0.5) / 30
-    spec = new_spec(MujocoMethod(integrator), dt_s, GRAVITY_M_S2)  # type: ignore[arg-type]
-    add_ground(spec)
-    for number in range(len(parts)):
-        add_falling_ball(spec, f"ball_{number}", 2.0 * number, **contact_of(0.0, BOUNCE.solref))
-    model = spec.compile()
+    method = MujocoMethod(integrator)  # type: ignore[arg-type]
+    contacts = [contact_of(0.0, BOUNCE.solref)] * len(parts)
+    model = falling_balls(method, dt_s, contacts).compile()
     data = mujoco.MjData(model)
     data.qpos[:] = parts * dt_s * speed
     data.qvel[:] = -np.sqrt(speed**2 - 2.0 * GRAVITY_M_S2 * data.qpos)

@@ -12,12 +12,14 @@ from roller_env.lab.contact.rolling import (
     PUSH,
     ROLLS_BELOW,
     SKIDS,
+    SOFT_SOLREF,
+    SOFT_TIME_CONSTANT_S,
     Skid,
     SteadyRoll,
     roll_time,
     slip_speed,
 )
-from roller_env.lab.contact.scene import SOFT_TIME_CONSTANT_S, resting_depth, soft_contact
+from roller_env.lab.contact.scene import resting_depth
 from roller_env.lab.game import FRICTION, GRAVITY_M_S2, RADIUS_M
 from roller_env.lab.methods import MUJOCO, PYRAMIDAL, MujocoMethod
 from roller_env.lab.simulate import Path
@@ -60,7 +62,7 @@ def test_what_rk4_keeps_is_the_shorter_lever_of_a_ball_that_sinks_in(scene: Stea
     The creep of the soft friction is the rest, 2 % of it.
     """
     pull = GRAVITY_M_S2 * math.cos(math.radians(scene.slope_deg))
-    depth = resting_depth(soft_contact()["solref"], pull)
+    depth = resting_depth(SOFT_SOLREF, pull)
     lever = RADIUS_M - depth / 2.0
     slower = 1.0 - 1.4 / (1.0 + 0.4 * (RADIUS_M / lever) ** 2)
     assert scene.trial(RK4, 0.01).errors()["acceleration"] == pytest.approx(slower, rel=0.03)

@@ -9,8 +9,7 @@ import pytest
 
 from roller_env.lab.contact import CONTACT_SCENES
 from roller_env.lab.contact.rolling import Skid
-from roller_env.lab.contact.scene import ContactScene
-from roller_env.lab.contact.trial import steps_of
+from roller_env.lab.contact.scene import ContactScene, steps_of
 from roller_env.lab.methods import RIGID_BODY, MujocoMethod, without_warnings
 from roller_env.lab.scene import SteadyTrial, measure
 

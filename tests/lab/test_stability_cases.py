@@ -11,13 +11,23 @@ import mujoco
 import pytest
 
 from roller_env.compile.compiled import compile_level
-from roller_env.lab.game import Course, play
-from roller_env.lab.stability import run
-from roller_env.lab.stability.cases import FULL, QUICK
-from roller_env.lab.stability.failure import rows, simulated
+from roller_env.lab.game import (
+    GATE_SPEED_M_S,
+    GRAVITY_M_S2,
+    PLATE_SPEED_M_S,
+    RADIUS_M,
+    THROUGH_M,
+    Course,
+    play,
+)
+from roller_env.lab.stability import failures, hard_cases, run
 from roller_env.lab.stability.failures import FAILURES, hanging_gate_level
-from roller_env.lab.stability.hard_cases import ALL_PRESETS, HARD_CASES, run_case
+from roller_env.lab.stability.hard_cases import HARD_CASES, READERS, REQUIREMENTS
+from roller_env.lab.stability.limits import FULL, QUICK, WORDS
 from roller_env.lab.stability.run import CASES
+from roller_env.lab.table import frame
+from roller_env.physics.presets import PRESETS
+from roller_env.units import quants
 
 KNOWN_TO_FAIL = {
     ("lane_of_seams", "fast", "greatest bump, mm"),
@@ -30,8 +40,8 @@ KNOWN_TO_FAIL = {
 
 @pytest.mark.parametrize("name", HARD_CASES)
 def test_a_hard_case_of_the_game_is_within_what_is_acceptable(name: str) -> None:
-    found = run_case(HARD_CASES[name], ALL_PRESETS, QUICK)
-    assert {row["preset"] for row in found} == {preset.name for preset in ALL_PRESETS}
+    found = hard_cases.rows(name, QUICK)
+    assert {row["preset"] for row in found} == set(PRESETS)
     failing = {
         (row["case"], row["preset"], row["quantity"]) for row in found if row["verdict"] == "fails"
     }
@@ -39,14 +49,38 @@ def test_a_hard_case_of_the_game_is_within_what_is_acceptable(name: str) -> None
 
 
 def test_what_is_known_to_fail_has_a_note() -> None:
-    assert all(HARD_CASES[case].note for case, _, _ in KNOWN_TO_FAIL)
+    noted = set(REQUIREMENTS.case[REQUIREMENTS.note != ""])
+    assert noted >= {case for case, _, _ in KNOWN_TO_FAIL}
+
+
+def test_every_hard_case_has_requirements_that_can_be_read() -> None:
+    assert list(REQUIREMENTS.case.unique()) == list(HARD_CASES)
+    assert set(REQUIREMENTS.quantity) == set(READERS)
+    assert REQUIREMENTS.reason.all()
+
+
+def test_requirements_that_follow_from_the_games_numbers_do() -> None:
+    """Half a deck deep the centre is through; a slab at v may lift the ball by v²/2g, and 1 mm."""
+    limits = REQUIREMENTS.set_index(["case", "quantity"]).limit
+    depth, gain = "deepest contact, mm", "energy gained, as height, mm"
+    for case in ("landing_from_the_tube", "gate_closing_on_the_ball"):
+        assert limits[case, depth] == pytest.approx(1e3 * THROUGH_M)
+    assert limits["riding_a_sinking_gate", depth] == pytest.approx(1e3 * RADIUS_M / 10)
+    for case, slab in (
+        ("riding_a_sinking_gate", GATE_SPEED_M_S),
+        ("pressed_to_a_sinking_gate", GATE_SPEED_M_S),
+        ("wedged_between_gate_and_wall", GATE_SPEED_M_S),
+        ("plate_sinking_under_the_ball", PLATE_SPEED_M_S),
+        ("landing_from_the_tube", 0.0),
+    ):
+        assert limits[case, gain] == pytest.approx(1.0 + 1e3 * slab**2 / (2.0 * GRAVITY_M_S2))
+    assert limits["lane_of_seams", "greatest bump, mm"] == pytest.approx(1e3 * quants(1.0))
 
 
 @pytest.mark.parametrize("name", FAILURES)
 def test_a_failure_fails_and_its_cures_cure_it(name: str) -> None:
-    failure = FAILURES[name]()
-    paths = [simulated(setting, failure.seconds) for setting in failure.settings]
-    found = rows(failure, paths, repeats=1)
+    found, curves = failures.rows(name, repeats=1)
+    assert [float(series.max()) for _, series in curves] == [row["value"] for row in found]
     assert [row["role"] for row in found] == ["fails", *["cures"] * (len(found) - 1)]
     assert [row["verdict"] for row in found] == ["fails", *["holds"] * (len(found) - 1)]
     assert found[0]["time_ratio"] == found[0]["evaluations_ratio"] == 1.0
@@ -76,23 +110,25 @@ def test_a_falling_ball_keeps_its_energy() -> None:
 
 
 def test_without_names_everything_is_selected() -> None:
-    selection = run.select((), FULL)
-    assert selection.limits == tuple(CASES)
-    assert selection.failures == tuple(FAILURES)
-    assert selection.hard_cases == tuple(HARD_CASES)
+    assert run.select((), FULL) == [
+        *(("limits", name) for name in CASES),
+        *(("failures", name) for name in FAILURES),
+        *(("hard_cases", name) for name in HARD_CASES),
+    ]
 
 
 def test_a_quick_run_leaves_out_slow_limits_unless_they_are_named() -> None:
-    slow = next(name for name, case in CASES.items() if not case.quick)
-    assert slow not in run.select((), QUICK).limits
-    assert run.select((slow,), QUICK).limits == (slow,)
+    slow = next(name for name, words in WORDS.items() if not words["quick"])
+    assert ("limits", slow) not in run.select((), QUICK)
+    assert ("limits", slow) not in run.select((WORDS[slow]["group"],), QUICK)
+    assert run.select((slow,), QUICK) == [("limits", slow)]
 
 
 def test_a_name_that_is_a_group_and_a_failure_means_both() -> None:
     selection = run.select(("tunnelling",), QUICK)
-    assert selection.failures == ("tunnelling",)
-    assert "tunnelling_2ms" in selection.limits
-    assert not selection.hard_cases
+    assert ("failures", "tunnelling") in selection
+    assert ("limits", "tunnelling_2ms") in selection
+    assert {section for section, _ in selection} == {"limits", "failures"}
 
 
 @pytest.mark.parametrize(
@@ -141,7 +177,7 @@ def test_results_are_written_as_tables_and_pictures(tmp_path: Path) -> None:
 
 
 def test_the_summary_names_what_does_not_hold() -> None:
-    results = run.Results(hard_cases=run_case(HARD_CASES["skidding"], ALL_PRESETS, QUICK))
+    results = run.Results({"hard_cases": frame(hard_cases.rows("skidding", QUICK))}, {})
     (line,) = run.summary(results)
     assert "13 of 15" in line
     assert "skidding (default, hop at 4 m/s of slip, mm)" in line

@@ -4,29 +4,45 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roller_env.lab.stability.bisection import bisect, first_failure, locate
-from roller_env.lab.stability.cases import EXACT, FULL, QUICK, Case, Effort, Finding, judged
-from roller_env.lab.stability.impact import worst_return
-from roller_env.lab.stability.run import CASES, GROUPS
-from roller_env.lab.stability.scenes import TAU_S
-from roller_env.lab.stability.smooth import drag_limit, rk4_servo_limit, stability_polynomial
+from roller_env.lab.stability.contacts import CONTACTS, TAU_S, worst_return
+from roller_env.lab.stability.limits import (
+    EXACT,
+    FULL,
+    QUICK,
+    WORDS,
+    Limit,
+    Quantity,
+    judged,
+    locate,
+)
+from roller_env.lab.stability.run import CASES
+from roller_env.lab.stability.smooth import (
+    SMOOTH,
+    drag_limit,
+    rk4_servo_limit,
+    stability_polynomial,
+)
 from roller_env.physics.materials import restitution
 from roller_env.rigid_body import INTEGRATORS, Integrator
 
 DIFFER = {"speculative_exactly_touching"}
 """Where MuJoCo does not do what its manual says; the case's note has the reason."""
 
-QUICK_CASES = [name for name, case in CASES.items() if case.quick]
+QUICK_CASES = [name for name, words in WORDS.items() if words["quick"]]
+
+
+def test_every_limit_is_measured_and_has_words() -> None:
+    assert {*SMOOTH, *CONTACTS} == set(WORDS)
+    assert not SMOOTH.keys() & CONTACTS.keys()
 
 
 @pytest.mark.parametrize("name", QUICK_CASES)
 def test_a_limit_is_where_its_formula_puts_it(name: str) -> None:
-    row = judged(CASES[name], QUICK)
+    row = judged(name, CASES[name], QUICK)
     expected = "differs" if name in DIFFER else "holds"
     assert row["verdict"] == expected, (row["measured"], row["predicted"])
 
@@ -34,29 +50,28 @@ def test_a_limit_is_where_its_formula_puts_it(name: str) -> None:
 def test_a_band_wider_than_one_per_cent_says_why() -> None:
     silent = [
         name
-        for name, case in CASES.items()
-        if (case.band[0] < EXACT[0] or case.band[1] > EXACT[1]) and not case.note
+        for name, words in WORDS.items()
+        if (words["low"] < EXACT[0] or words["high"] > EXACT[1]) and not words["note"]
     ]
     assert not silent
 
 
 def test_what_differs_from_its_prediction_says_why() -> None:
-    assert all(CASES[name].note for name in DIFFER)
+    assert all(WORDS[name]["note"] for name in DIFFER)
 
 
 def test_every_limit_has_a_formula_a_source_and_a_criterion() -> None:
-    for case in CASES.values():
-        assert case.formula, case.name
-        assert case.source, case.name
-        assert case.criterion, case.name
+    for name, words in WORDS.items():
+        for column in ("group", "quantity", "method", "formula", "source", "criterion"):
+            assert isinstance(words[column], str), (name, column)
         # They stand in a Markdown table.
-        assert "|" not in case.formula + case.quantity + case.method, case.name
-        assert case.group in GROUPS
+        assert "|" not in words["formula"] + words["quantity"] + words["method"], name
 
 
 def test_what_has_no_limit_says_how_far_it_was_searched() -> None:
-    for case in CASES.values():
-        assert math.isfinite(case.predicted) or math.isfinite(case.searched_to), case.name
+    for name, case in CASES.items():
+        limited = math.isfinite(case.predicted)
+        assert limited or math.isfinite(WORDS[name]["searched_to"]), name
 
 
 @given(
@@ -68,17 +83,27 @@ def test_what_has_no_limit_says_how_far_it_was_searched() -> None:
 def test_bisection_finds_a_known_threshold(
     threshold: float, below: float, above: float, tolerance: float
 ) -> None:
-    found = bisect(lambda value: value < threshold, threshold / below, threshold * above, tolerance)
-    assert found.holds < threshold <= found.fails
-    assert found.fails / found.holds - 1.0 <= tolerance
-    assert found.holds <= found.value <= found.fails
-    assert found.runs <= 3 + math.log2(math.log(below * above) / math.log1p(tolerance) + 1.0)
+    """From a guess on either side, in no more runs than doubling and halving need."""
+    for guess in (threshold / below, threshold * above):
+        tried: list[float] = []
+
+        def holds(value: float) -> bool:
+            tried.append(value)  # noqa: B023 - called in this round only
+            return value < threshold
+
+        found = locate(holds, guess, tolerance)
+        last_good = max(value for value in tried if value < threshold)
+        first_bad = min(value for value in tried if value >= threshold)
+        assert last_good <= found <= first_bad
+        assert first_bad / last_good - 1.0 <= tolerance
+        doublings = 3.0 + math.log2(max(below, above))
+        assert len(tried) <= doublings + 3 + math.log2(math.log(2.0) / math.log1p(tolerance) + 1.0)
 
 
 @given(threshold=st.floats(1e-2, 1e2), off=st.floats(1e-3, 1e3))
 def test_a_threshold_is_found_from_a_wrong_guess_too(threshold: float, off: float) -> None:
     found = locate(lambda value: value < threshold, threshold * off, 1e-3)
-    assert found.value == pytest.approx(threshold, rel=1e-3)
+    assert found == pytest.approx(threshold, rel=1e-3)
 
 
 def test_a_threshold_that_is_nowhere_near_the_guess_is_refused() -> None:
@@ -89,60 +114,51 @@ def test_a_threshold_that_is_nowhere_near_the_guess_is_refused() -> None:
 
 
 @given(threshold=st.floats(0.5, 99.0))
-def test_the_first_failure_is_the_first_value_past_the_threshold(threshold: float) -> None:
-    values = np.arange(1.0, 101.0)
-    found = first_failure(lambda value: value < threshold, values)
-    assert found.fails == math.ceil(threshold)
-    assert found.runs == math.ceil(threshold)
+def test_where_no_limit_is_expected_the_first_failure_is_the_limit(threshold: float) -> None:
+    tried: list[float] = []
+
+    def holds(_effort: object, value: float) -> bool:
+        tried.append(value)
+        return value < threshold
+
+    assert Limit(math.inf, holds).measure(QUICK, searched_to=100.0) == tried[-1] >= threshold
+    assert tried == sorted(tried)
+    assert tried[0] == 0.5
+    assert tried[-1] / 1.1 < threshold or threshold == 0.5
 
 
-def test_what_never_fails_has_an_infinite_threshold() -> None:
-    found = first_failure(lambda _: True, (1.0, 2.0))
-    assert found.value == math.inf
-    assert found.holds == 2.0
+def test_what_never_fails_has_an_infinite_limit() -> None:
+    assert Limit(math.inf, lambda _effort, _value: True).measure(QUICK, 2.0) == math.inf
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "tolerance", "message"),
+    ("guess", "tolerance"),
+    [(0.0, 0.1), (-1.0, 0.1), (math.inf, 0.1), (math.nan, 0.1), (1.0, 0.0), (1.0, 1.0)],
+)
+def test_a_search_that_makes_no_sense_is_refused(guess: float, tolerance: float) -> None:
+    with pytest.raises(ValueError, match=rf"0 < guess.*found {guess:g} and {tolerance:g}"):
+        locate(lambda value: value < 5.0, guess, tolerance)
+
+
+@pytest.mark.parametrize(
+    ("predicted", "measured", "verdict"),
     [
-        (0.0, 1.0, 0.1, "0 < low < high"),
-        (2.0, 1.0, 0.1, "0 < low < high"),
-        (1.0, math.inf, 0.1, "0 < low < high"),
-        (1.0, math.nan, 0.1, "0 < low < high"),
-        (1.0, 9.0, 0.0, "tolerance: found 0"),
-        (1.0, 2.0, 0.1, "2 holds"),
-        (6.0, 9.0, 0.1, "6 fails"),
+        (1.0, 1.1, "differs"),
+        (1.0, 1.005, "holds"),
+        (math.inf, 7.0, "differs"),
+        (7.0, math.inf, "differs"),
+        (7.0, math.nan, "differs"),
+        (math.inf, math.inf, "holds"),
     ],
 )
-def test_a_bracket_that_makes_no_sense_is_refused(
-    low: float, high: float, tolerance: float, message: str
+def test_a_wrong_prediction_is_found_to_be_wrong(
+    predicted: float, measured: float, verdict: str
 ) -> None:
-    with pytest.raises(ValueError, match=message):
-        bisect(lambda value: value < 5.0, low, high, tolerance)
-
-
-@pytest.mark.parametrize("values", [(), (2.0, 1.0), (0.0, 1.0), (1.0, math.nan)])
-def test_values_that_do_not_rise_are_refused(values: tuple[float, ...]) -> None:
-    with pytest.raises(ValueError, match=r"rise|at least one"):
-        first_failure(lambda _: True, values)
-
-
-def test_a_wrong_prediction_is_found_to_be_wrong() -> None:
     """The harness itself can say no: the measured value a tenth off, and a limit where none is."""
-    off = _case(predicted=1.0, measured=1.1)
-    assert judged(off, QUICK)["verdict"] == "differs"
-    assert judged(off, QUICK)["ratio"] == pytest.approx(1.1)
-    assert judged(_case(predicted=math.inf, measured=7.0), QUICK)["verdict"] == "differs"
-    assert judged(_case(predicted=7.0, measured=math.inf), QUICK)["verdict"] == "differs"
-    assert judged(_case(predicted=7.0, measured=math.nan), QUICK)["verdict"] == "differs"
-    assert judged(_case(predicted=math.inf, measured=math.inf), QUICK)["verdict"] == "holds"
-
-
-def _case(predicted: float, measured: float) -> Case:
-    def measure(_effort: Effort) -> Finding:
-        return Finding(measured)
-
-    return Case("case", "group", "what", "how", predicted, "f", "source", "criterion", measure)
+    row = judged("servo_rk4_1", Quantity(predicted, lambda _effort: measured), QUICK)
+    assert row["verdict"] == verdict
+    if math.isfinite(predicted):
+        assert row["ratio"] == pytest.approx(measured / predicted, nan_ok=True)
 
 
 def test_the_full_effort_is_finer_than_the_quick_one() -> None:

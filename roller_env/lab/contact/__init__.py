@@ -7,16 +7,13 @@ from __future__ import annotations
 
 from typing import Final
 
-from roller_env.lab.contact.course import GAME_SCENES
-from roller_env.lab.contact.impact import IMPACTS
-from roller_env.lab.contact.rolling import ROLLING
+from roller_env.lab.contact import course, impact, rolling, simbenchmark
 from roller_env.lab.contact.scene import ContactScene
-from roller_env.lab.contact.simbenchmark import SIMBENCHMARK
 
 CONTACT_SCENES: Final[tuple[ContactScene, ...]] = (
-    *ROLLING,
-    *IMPACTS,
-    *GAME_SCENES,
-    *SIMBENCHMARK,
+    *(rolling.INCLINE, rolling.PUSH, *rolling.SKIDS),
+    *(impact.BOUNCE, impact.RESTITUTION),
+    *(course.GATE_PUSH, course.COURSE),
+    *simbenchmark.SCENES,
 )
 """Every contact scene, the simple ones first."""

@@ -1,49 +1,222 @@
-"""What every contact scene shares: its description, its solver settings and its contacts."""
+"""What contact scenes share: worlds and balls, the trial that is recorded and timed, the scene.
+
+``scenes.csv`` says what charts and tables call each, and when a method has failed it.
+"""
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from functools import cache
+from pathlib import Path as File
+from typing import Any, ClassVar, Final
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
+from pandas import read_csv
 
-from roller_env.lab.contact.trial import MujocoTrial
-from roller_env.lab.game import FRICTION, MASS_KG, RADIUS_M
-from roller_env.lab.methods import Method, MujocoMethod
+from roller_env.lab.game import FRICTION
+from roller_env.lab.methods import MUJOCO, Cone, Method, MujocoMethod, without_warnings
 from roller_env.lab.scene import Measure
+from roller_env.lab.simulate import Float64, Path, record
 from roller_env.physics.materials import IMPEDANCE, contact_parameters
 from roller_env.physics.presets import PRESETS, PhysicsPreset
 
-Float64 = npt.NDArray[np.float64]
+CONVERGED: Final[Mapping[str, float]] = {"iterations": 100, "tolerance": 1e-14}
+"""Solver options with which no error of its own is taken for one of the integrator's."""
 
-SOFT_TIME_CONSTANT_S: Final = 0.04
-"""Of the soft contact: 2 h for the largest step h = 0.02 s with which it is used, what MuJoCo's
-``refsafe`` would ask for. Euler's limit, damping times h below 2, is at h = 0.04 s."""
+UPWARDS: Final = ((0.0, 0.0, 1.0),)
 
-STIFF_FRICTION: Final = 10.0
-"""``impratio`` of these scenes. The game has 1; the soft contacts here are four times as slow as
-its own, and their creep would hide what integrators do."""
+
+def new_spec(
+    method: MujocoMethod, dt_s: float, gravity_m_s2: float = 0.0, **options: Any
+) -> mujoco.MjSpec:
+    """Return an empty world with the method's settings, and more of ``mjOption``, flags added."""
+    spec = mujoco.MjSpec()
+    method.configure(spec, dt_s)
+    spec.option.gravity = [0.0, 0.0, -gravity_m_s2]
+    for name, value in options.items():
+        set_already = getattr(spec.option, name)
+        setattr(spec.option, name, set_already | value if name.endswith("flags") else value)
+    return spec
+
+
+def add_ball(
+    spec: mujoco.MjSpec,
+    at: Sequence[float],
+    radius_m: float,
+    mass_kg: float = 1.0,
+    slides: Sequence[Sequence[float]] = (),
+    **geom: Any,
+) -> None:
+    """Add a ball, centre at ``at`` in metres, on a free joint or on slide joints along axes."""
+    body = spec.worldbody.add_body(pos=list(at))
+    for axis in slides:
+        body.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
+    if not slides:
+        body.add_freejoint()
+    size = [radius_m, 0.0, 0.0]
+    body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, mass=mass_kg, **geom)
+
+
+def add_ground(spec: mujoco.MjSpec, **geom: Any) -> None:
+    """Add the plane z = 0."""
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], **geom)
+
+
+def contact_of(
+    friction: float, solref: Sequence[float], impedance: float = IMPEDANCE
+) -> dict[str, Any]:
+    """Return a geom's contact: of constant impedance, and of higher priority than MuJoCo's own.
+
+    With a constant impedance ``solref = (tau, ratio)`` is exactly the spring and damper
+    ``x'' = -2 x' / tau - x / (tau ratio)²``, and ``(-K, -B)`` is ``x'' = -K x - B x'``.
+    """
+    return {
+        "friction": [friction, 0.0, 0.0],
+        "solref": list(solref),
+        "solimp": [impedance, impedance, 0.001, 0.5, 2.0],
+        "condim": 3 if friction else 1,
+        "priority": 1,
+    }
+
+
+def game_contact(
+    friction: float = FRICTION,
+    elasticity: float = 0.0,
+    preset: PhysicsPreset = PRESETS["default"],
+) -> dict[str, Any]:
+    """Return a geom's contact as the product calibrates it for a preset, however it is stepped."""
+    parameters = contact_parameters(friction, elasticity, preset)
+    return contact_of(parameters.friction, parameters.solref)
+
+
+def resting_depth(solref: Sequence[float], pull_m_s2: float) -> float:
+    """Return how deep a body rests in a contact of the game's impedance d, m: (1 - d) pull / K.
+
+    MuJoCo's contact gives -B v - K r + (1 - d) a0 (Computation chapter, "Constraint model"; d is
+    constant). At rest that is 0, and a0 is minus the pull.
+    """
+    return (1.0 - IMPEDANCE) * pull_m_s2 / -solref[0]
+
+
+def steps_of(seconds: float, dt_s: float) -> int:
+    """Return how many steps of ``dt_s`` make ``seconds``.
+
+    Raises:
+        ValueError: it is not a whole number of steps, so that the end would be another time.
+    """
+    if not 0.0 < dt_s <= seconds:
+        raise ValueError(f"dt_s: found {dt_s:g}; must be more than 0 and at most {seconds:g} s")
+    steps = round(seconds / dt_s)
+    if abs(steps * dt_s - seconds) > 1e-9 * seconds:
+        raise ValueError(
+            f"dt_s: found {dt_s:g}, of which no whole number makes {seconds:g} s; the nearest that "
+            f"fits is {seconds / steps:.10g}"
+        )
+    return steps
+
+
+Plan = Sequence[tuple[float, Sequence[float]]]
+"""Seconds, and MuJoCo's controls, (nu,), that are held so long, one after the other."""
+
+_STATE: Final = mujoco.mjtState.mjSTATE_INTEGRATION
+
+
+class MujocoTrial:
+    """One simulation of a scene: a `SteadyTrial`, with its ``model`` and ``data``.
+
+    `run` writes down the path, which takes Python; `run_part` repeats the same steps in nothing
+    but MuJoCo's loop. SimBenchmark, too, measures error and time in two passes.
+    """
+
+    def __init__(self, scene: ContactScene, method: MujocoMethod, dt_s: float):
+        self.model = scene._world(method, dt_s).compile()
+        self.data = mujoco.MjData(self.model)
+        self._scene, self._method = scene, method
+        self._plan = [(steps_of(seconds, dt_s), ctrl) for seconds, ctrl in scene.plan]
+        self._steps = sum(steps for steps, _ in self._plan)
+        first, last = (round(moment / dt_s) for moment in scene.timed_s or (0.0, scene.horizon_s))
+        self._part = range(first, last)
+        self._before_part = np.empty(mujoco.mj_stateSize(self.model, _STATE))
+        self._path: Path | None = None
+
+    @property
+    def part_s(self) -> float:
+        """Simulated time of what `run_part` simulates, seconds."""
+        return float(len(self._part) * self.model.opt.timestep)
+
+    def run(self) -> None:
+        """Simulate the whole motion and keep its path."""
+        model, data = self.model, self.data
+        mujoco.mj_resetData(model, data)
+        self._scene._start(data, model.opt.timestep)
+        begins = np.cumsum([0, *(steps for steps, _ in self._plan)]).tolist()[:-1]
+
+        def control(step: int) -> None:
+            if step == self._part.start:
+                mujoco.mj_getState(model, data, self._before_part, _STATE)
+            if step in begins:
+                data.ctrl[:] = self._plan[begins.index(step)][1]
+
+        self._path = record(model, data, self._steps, before=control)
+
+    def run_part(self) -> None:
+        """Simulate the part that is timed; a motion with a plan is timed as a whole."""
+        mujoco.mj_setState(self.model, self.data, self._before_part, _STATE)
+        for steps, ctrl in self._plan:
+            self.data.ctrl[:] = ctrl
+            mujoco.mj_step(self.model, self.data, min(steps, len(self._part)))
+
+    @property
+    def path(self) -> Path:
+        """The path of the last run; the first use runs it."""
+        if self._path is None:
+            with without_warnings():
+                self.run()
+        assert self._path is not None
+        return self._path
+
+    def errors(self) -> Mapping[str, float]:
+        """Return the errors by the name of their measure, NaN where it diverged."""
+        if self.path.finite:
+            return self._scene.judge(self.path, self._method)
+        return {measure.name: math.nan for measure in self._scene.measures}
+
+
+_WORDS: Final = read_csv(File(__file__).with_name("scenes.csv"))
+
+
+def described(scene: str) -> dict[str, Any]:
+    """Return what ``scenes.csv`` says of a scene: arguments of a `ContactScene`."""
+    rows = _WORDS[_WORDS.scene == scene]
+    first = rows.iloc[0]
+    return {
+        "name": scene,
+        "title": first.title,
+        "horizon_s": float(first.horizon_s),
+        "measures": tuple(Measure(row.measure, row.label, row.kind) for row in rows.itertuples()),
+        "time_steps_s": tuple(map(float, first.time_steps_s.split())),
+        "failure": float(first.failure),
+    }
 
 
 @dataclass(frozen=True)
 class ContactScene(ABC):
-    """A scene that MuJoCo simulates; see `roller_env.lab.scene.Scene`.
+    """A `roller_env.lab.scene.Scene` that MuJoCo simulates.
 
-    Contact parameters never follow the time step where an error is called discretisation: at every
-    step, and for the reference, it is the same soft contact.
+    Where an error is called discretisation, the contact is the same soft one at every step.
     """
 
     name: str
     title: str
     horizon_s: float
     measures: Sequence[Measure]
-    methods: Sequence[Method]
     time_steps_s: Sequence[float]
     failure: float
+    methods: Sequence[Method] = MUJOCO
 
     def trial(self, method: Method, dt_s: float) -> MujocoTrial:
         """Return a simulation of the scene, ready to run.
@@ -56,82 +229,47 @@ class ContactScene(ABC):
                 f"{self.name}: found method {method.name!r}; the rigid body knows no contact, "
                 f"allowed are {', '.join(repr(one.name) for one in self.methods)}"
             )
-        return self._trial(method, dt_s)
+        steps_of(self.horizon_s, dt_s)
+        return MujocoTrial(self, method, dt_s)
+
+    timed_s: ClassVar[tuple[float, float] | None] = None
+    """Begin and end of what is timed, if that is not all."""
 
     @abstractmethod
-    def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial: ...
+    def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        """Return the scene's bodies, ground and settings."""
+
+    def _start(self, data: mujoco.MjData, dt_s: float) -> None:  # noqa: B027 - some just fall
+        """Put the freshly reset data where the motion begins."""
 
     @property
-    def _names(self) -> list[str]:
-        return [one.name for one in self.measures]
+    def plan(self) -> Plan:
+        """Controls of the whole motion."""
+        return ((self.horizon_s, ()),)
+
+    @abstractmethod
+    def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
+        """Return the errors of a finite path by the name of their measure."""
 
 
-def new_spec(method: MujocoMethod, dt_s: float, gravity_m_s2: float) -> mujoco.MjSpec:
-    """Return a world with the method's settings, in which the solver always converges.
+@dataclass(frozen=True)
+class BallScene(ContactScene):
+    """A scene whose first body is a free ball, whose place is compared at ``moments_s``."""
 
-    The iterations are more than any scene takes and the tolerance is as small as doubles can tell,
-    so that no solver error is taken for one of the integrator's.
-    """
-    spec = mujoco.MjSpec()
-    method.configure(spec, dt_s)
-    spec.option.gravity = [0.0, 0.0, -gravity_m_s2]
-    spec.option.iterations = 100
-    spec.option.tolerance = 1e-14
-    spec.option.impratio = STIFF_FRICTION
-    return spec
+    moments_s: Sequence[float] = ()
+    reference_step_s: float = 4e-5
+    """Of the converged model; none of the scene's own, so that nothing is compared with itself."""
 
+    def places(self, path: Path) -> Float64:
+        """Return where the ball is at the scene's moments, (moments, 3) m."""
+        return path.qpos[np.rint(np.array(self.moments_s) / path.time[1]).astype(int), :3]
 
-def soft_contact(friction: float = FRICTION) -> dict[str, Any]:
-    """Return a geom's contact: critically damped, and soft enough for steps of 0.02 s.
-
-    In MuJoCo's direct form, which ``refsafe`` leaves alone: B = 2 / tau, K = (B / 2)^2.
-    """
-    damping = 2.0 / SOFT_TIME_CONSTANT_S
-    return contact_of(friction, (-((damping / 2.0) ** 2), -damping))
+    def away(self, path: Path, cone: Cone = "elliptic") -> Float64:
+        """Return how far that is from where a vanishing step takes the ball, (moments, 3) m."""
+        return self.places(path) - _converged(self, cone)
 
 
-def game_contact(
-    friction: float = FRICTION,
-    elasticity: float = 0.0,
-    preset: PhysicsPreset = PRESETS["default"],
-) -> dict[str, Any]:
-    """Return a geom's contact as the product calibrates it for a preset, the default's if unsaid.
-
-    The product scales it with the preset's time step. Here it stays what it is for that preset
-    however the scene is stepped.
-    """
-    parameters = contact_parameters(friction, elasticity, preset)
-    return contact_of(parameters.friction, parameters.solref)
-
-
-def contact_of(friction: float, solref: tuple[float, float]) -> dict[str, Any]:
-    """Return a geom's contact from its friction and its direct ``solref``, of higher priority."""
-    return {
-        "friction": [friction, 0.0, 0.0],
-        "solref": list(solref),
-        "solimp": [IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0],
-        "priority": 1,
-    }
-
-
-def resting_depth(solref: Sequence[float], pull_m_s2: float) -> float:
-    """Return how deep a body rests in a contact of constant impedance, metres.
-
-    MuJoCo's contact gives the acceleration d (-B v - K r) / d_max + (1 - d) a0 (Computation
-    chapter, "Constraint model"; in the direct form K and B are divided by d_max). At rest it is 0,
-    and a0 is minus the pull, so with constant d the depth -r is (1 - d) pull / K.
-    """
-    return (1.0 - IMPEDANCE) * pull_m_s2 / -solref[0]
-
-
-def add_ball(spec: mujoco.MjSpec, position: Sequence[float], name: str = "ball") -> None:
-    """Add the game's ball on a free joint of the same name, centre at ``position`` in metres."""
-    body = spec.worldbody.add_body(name=name, pos=list(position))
-    body.add_freejoint(name=name)
-    body.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_SPHERE,
-        size=[RADIUS_M, 0.0, 0.0],
-        mass=MASS_KG,
-        condim=3,
-    )
+@cache
+def _converged(scene: BallScene, cone: Cone) -> Float64:
+    """Return where RK4, the most accurate method, takes the ball with the reference's step."""
+    return scene.places(scene.trial(MujocoMethod("RK4", cone), scene.reference_step_s).path)

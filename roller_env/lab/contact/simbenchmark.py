@@ -3,26 +3,20 @@
 SimBenchmark (Kang and Hwangbo, 2018, https://leggedrobotics.github.io/SimBenchmark, source at
 https://github.com/leggedrobotics/SimBenchmark, commit 3fd1764) compared RaiSim, Bullet, ODE, DART
 and MuJoCo 1.50. Its set-ups and measures are used here so that MuJoCo 4's rows can stand beside
-its published ones, of which `PUBLISHED` holds those that have a counterpart.
+its published ones, with which the tests compare them.
 
-Three things about them that are not on its pages:
+Three things about them that are not on its pages: the direction called "xy" is 60 degrees from x,
+not 45. MuJoCo was left out of the bouncing test, since it has no coefficient of restitution; the
+product's calibration gives it one. And the published 666 errors of MuJoCo are not penetration: its
+first sample is taken before the positions are first computed, so all 216 balls are at the origin,
+and drop from 1.31 m with friction 0.8 where the other engines' are smooth and start on the ground.
+`DROPPED_PILE` repeats that; with the empty sample put back in, MuJoCo 4 gives the published figures
+within 0.2 % at 10 ms and 3 % at 100 ms.
 
-- The direction called "xy" is (1/2, sqrt(3)/2), 60 degrees from x, not 45.
-- MuJoCo was left out of the bouncing test, since it has no coefficient of restitution. The
-  product's calibration gives it one, so here is the missing row.
-- The published 666 errors of MuJoCo are not penetration. Its first sample is taken before the
-  positions are first computed, so all 216 balls are at the origin: 23,220 pairs of squared
-  penetration 0.04 m² and 216 of 0.01 m² with the ground are 930.96 m², which the time mean turns
-  into 93.1 m²/s times the step. Its balls also have friction 0.8 and drop from 1.31 m, where the
-  other engines' are smooth and start on the ground. `dropped` repeats that; with the empty sample
-  put back in, MuJoCo 4 gives the published figures within 0.2 % at 10 ms and 3 % at 100 ms.
-
-SimBenchmark's solvers for MuJoCo were PGS, CG and Newton, all with sparse matrices. Here it is CG,
-as its sparse path is right in MuJoCo 4.0.0 (Newton's Hessian is not), and dense matrices of 156
-and 1296 degrees of freedom are several times slower. Contact parameters are MuJoCo's
-defaults, as there, but in the bouncing test.
-
-What is cut, for time: steps below 1 ms (rolling, bouncing), 5 ms (666) and 10 ms (666 dropped).
+Of SimBenchmark's solvers for MuJoCo it is CG here, as its sparse path is right in MuJoCo 4.0.0
+(Newton's Hessian is not), and dense matrices of 1296 degrees of freedom are several times slower.
+Contact parameters are MuJoCo's defaults, as there, but in the bouncing test. Means over time are of
+the steps' beginnings. Its smallest steps are left out, for time.
 """
 
 from __future__ import annotations
@@ -30,58 +24,28 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from itertools import product
 from typing import Any, Final
 
 import mujoco
 import numpy as np
-from pandas import read_csv
 from scipy.spatial.distance import pdist
 
-from roller_env.lab import simulate
-from roller_env.lab.contact.scene import ContactScene, Float64, game_contact
-from roller_env.lab.contact.trial import Held, MujocoTrial, steps_of
-from roller_env.lab.methods import MUJOCO, PYRAMIDAL, MujocoMethod
-from roller_env.lab.scene import Measure
-from roller_env.physics.presets import PhysicsPreset
+from roller_env.lab.contact import scene
+from roller_env.lab.contact.impact import calibrated
+from roller_env.lab.methods import MUJOCO, PYRAMIDAL, Method, MujocoMethod
+from roller_env.lab.simulate import Float64, Path
 
 GRAVITY_M_S2: Final = 9.81
 """SimBenchmark's, unlike the game's."""
 
-PUBLISHED: Final = read_csv(Path(__file__).with_suffix(".csv"))
-"""SimBenchmark's data without error reduction: ``test`` (the scene here that it belongs beside),
-``engine`` (with solver and integrator where there was a choice), ``dt_s``, ``error`` (its measure;
-infinite where the simulation blew up) and ``wall_s`` (CPU seconds of its machine of 2018).
 
-From ``data/rolling/default.csv``, ``data/bouncing/sample.csv``, ``data/666/sample.csv``.
-"""
-
-
-def benchmark_spec(method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
-    """Return an empty world with SimBenchmark's gravity, MuJoCo's defaults and the sparse CG."""
-    spec = mujoco.MjSpec()
-    method.configure(spec, dt_s)
-    spec.option.gravity = [0.0, 0.0, -GRAVITY_M_S2]
-    spec.option.solver = mujoco.mjtSolver.mjSOL_CG
-    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
+def benchmark_spec(method: MujocoMethod, dt_s: float, friction: float) -> mujoco.MjSpec:
+    """Return a ground with SimBenchmark's gravity, MuJoCo's defaults and the sparse CG."""
+    solver, jacobian = mujoco.mjtSolver.mjSOL_CG, mujoco.mjtJacobian.mjJAC_SPARSE
+    spec = scene.new_spec(method, dt_s, GRAVITY_M_S2, solver=solver, jacobian=jacobian)
+    scene.add_ground(spec, **rubbing(friction))
     return spec
-
-
-def add_sphere(
-    spec: mujoco.MjSpec, position: Sequence[float], radius_m: float, mass_kg: float, **contact: Any
-) -> None:
-    """Add a free sphere; ``contact`` are attributes of its geom."""
-    body = spec.worldbody.add_body(pos=list(position))
-    body.add_freejoint()
-    size = [radius_m, 0.0, 0.0]
-    body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, mass=mass_kg, **contact)
-
-
-def add_plane(spec: mujoco.MjSpec, friction: float) -> None:
-    """Add the ground z = 0."""
-    spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], **rubbing(friction)
-    )
 
 
 def rubbing(friction: float) -> dict[str, Any]:
@@ -90,13 +54,10 @@ def rubbing(friction: float) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Rolling(ContactScene):
-    """A box that carries 25 balls is pushed hard enough to slide; the balls roll on it.
+class Rolling(scene.ContactScene):
+    """A box with 25 balls is pushed along ``direction`` so that it slides; the balls roll on it."""
 
-    Attributes:
-        direction: (x, y) unit vector of the push.
-    """
-
+    methods: Sequence[Method] = (*MUJOCO, *PYRAMIDAL)
     direction: tuple[float, float] = (0.0, 1.0)
 
     force_n = 150.0
@@ -117,58 +78,38 @@ class Rolling(ContactScene):
         f2 = (self.force_n - f1) / self.box_kg / (3.5 / self.ball_kg + self.balls / self.box_kg)
         return (self.force_n - f1 - self.balls * f2) / self.box_kg, f2 / self.ball_kg
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
-        spec = benchmark_spec(method, dt_s)
-        add_plane(spec, self.ground_friction)
+    timed_s = (0.0, 0.2)
+
+    def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        spec = benchmark_spec(method, dt_s, self.ground_friction)
         half_edge, half_height, overlap = 10.0, 0.5, 2e-6
         box = spec.worldbody.add_body(pos=[0.0, 0.0, half_height - overlap])
         box.add_freejoint()
-        box.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=[half_edge, half_edge, half_height],
-            mass=self.box_kg,
-            friction=[self.ground_friction, 0.0, 0.0],
-        )
-        for x in np.arange(-4.0, 5.0, 2.0):
-            for y in np.arange(-4.0, 5.0, 2.0):
-                at = (x, y, 3.0 * half_height - overlap)
-                add_sphere(spec, at, half_height, self.ball_kg, **rubbing(self.ball_friction))
+        size, friction = [half_edge, half_edge, half_height], rubbing(self.ground_friction)
+        box.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=size, mass=self.box_kg, **friction)
+        for x, y in product(np.arange(-4.0, 5.0, 2.0), repeat=2):
+            at = (x, y, 3.0 * half_height - overlap)
+            scene.add_ball(spec, at, half_height, self.ball_kg, **rubbing(self.ball_friction))
+        return spec
 
-        def push(data: mujoco.MjData) -> None:
-            data.xfrc_applied[1, :2] = self.force_n * np.array(self.direction)
+    def _start(self, data: mujoco.MjData, dt_s: float) -> None:
+        data.xfrc_applied[1, :2] = self.force_n * np.array(self.direction)
 
-        def judge(path: simulate.Path) -> Mapping[str, float]:
-            return {"velocity": self.error(path.time, path.qvel[:, :3], path.qvel[:, 6:9])}
-
-        total, part = steps_of(self.horizon_s, dt_s), steps_of(0.2, dt_s)
-        plan = [Held(np.empty(0), part), Held(np.empty(0), total - part)]
-        return MujocoTrial(spec.compile(), push, plan, judge, self._names, slice(0, 1))
-
-    def error(self, time: Float64, box: Float64, ball: Float64) -> float:
-        """Return SimBenchmark's error: the mean over time of both squared velocity errors.
-
-        Args:
-            time: (S + 1,) seconds.
-            box: (S + 1, 3) velocities of the box, m/s.
-            ball: (S + 1, 3) velocities of the first ball, m/s.
-
-        Returns:
-            (m/s)², over the samples at the beginnings of the steps.
-        """
+    def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
+        """Return the mean over time of the squared velocity errors of box and ball, (m/s)²."""
         squares = 0.0
         way = np.append(self.direction, 0.0)
-        for acceleration, velocity in zip(self.accelerations_m_s2, (box, ball), strict=True):
-            exact = acceleration * time[:-1, None] * way
-            squares += float(((velocity[:-1] - exact) ** 2).sum(axis=1).mean())
-        return squares
+        velocities = path.qvel[:-1, :3], path.qvel[:-1, 6:9]
+        for acceleration, velocity in zip(self.accelerations_m_s2, velocities, strict=True):
+            exact = acceleration * path.time[:-1, None] * way
+            squares += float(((velocity - exact) ** 2).sum(axis=1).mean())
+        return {"velocity": squares}
 
 
-@dataclass(frozen=True)
-class Bouncing(ContactScene):
+class Bouncing(scene.ContactScene):
     """49 smooth balls of 10 kg drop 5 m and should bounce for ever; their energy is watched.
 
-    MuJoCo gets its elasticity of 1 from the product's calibration for the method and step. What
-    is then wrong: the Euler family's flight, whose energy is off by m g² h t / 2; and the bounce,
+    What is wrong: the Euler family's flight, whose energy is off by m g² h t / 2; and the bounce,
     by where in a step it falls. With RK4 the contact is a spring over 24 steps that holds the
     energy meanwhile, which this measure, kinetic and potential, counts as lost.
     """
@@ -177,58 +118,35 @@ class Bouncing(ContactScene):
     radius_m = 0.1
     ball_kg = 10.0
     side = 7
+    energy_j = side**2 * ball_kg * GRAVITY_M_S2 * height_m
+    """Of all balls at the start, above the ground."""
 
-    @property
-    def energy_j(self) -> float:
-        """Of all balls at the start, above the ground."""
-        return self.side**2 * self.ball_kg * GRAVITY_M_S2 * self.height_m
+    timed_s = (0.0, 2.0)
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
-        spec = benchmark_spec(method, dt_s)
-        add_plane(spec, 0.0)
-        integrator = "implicitfast" if method.integrator == "discrete" else method.integrator
-        contact = game_contact(0.0, 1.0, PhysicsPreset("bouncing", dt_s, integrator))
-        for x in range(self.side):
-            for y in range(self.side):
-                at = (2.0 * x, 2.0 * y, self.height_m)
-                add_sphere(spec, at, self.radius_m, self.ball_kg, condim=1, **contact)
+    def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        spec = benchmark_spec(method, dt_s, 0.0)
+        contact = calibrated(1.0, method, dt_s)
+        for x, y in np.ndindex(self.side, self.side):
+            at = (2.0 * x, 2.0 * y, self.height_m)
+            scene.add_ball(spec, at, self.radius_m, self.ball_kg, **contact)
+        return spec
 
-        def judge(path: simulate.Path) -> Mapping[str, float]:
-            return {"energy": self.error(path.qpos[:, 2::7], path.qvel.reshape(-1, 49, 6))}
-
-        total, part = steps_of(self.horizon_s, dt_s), steps_of(2.0, dt_s)
-        plan = [Held(np.empty(0), part), Held(np.empty(0), total - part)]
-        return MujocoTrial(
-            spec.compile(), lambda _data: None, plan, judge, self._names, slice(0, 1)
-        )
-
-    def error(self, height: Float64, velocity: Float64) -> float:
-        """Return SimBenchmark's error: the mean over time of the squared error of the energy.
-
-        Args:
-            height: (S + 1, balls) of the centres, metres.
-            velocity: (S + 1, balls, 6) linear and angular, m/s and rad/s.
-
-        Returns:
-            J², over the samples at the beginnings of the steps.
-        """
+    def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
+        """Return the mean over time of the squared error of the energy, J²."""
+        height, velocity = path.qpos[:-1, 2::7], path.qvel[:-1].reshape(-1, self.side**2, 6)
         inertia = 0.4 * self.ball_kg * self.radius_m**2
         doubled = self.ball_kg * velocity[..., :3] ** 2 + inertia * velocity[..., 3:] ** 2
         potential = self.ball_kg * GRAVITY_M_S2 * height.sum(axis=1)
         energy = 0.5 * doubled.sum(axis=(1, 2)) + potential
-        return float(((energy - self.energy_j)[:-1] ** 2).mean())
+        return {"energy": float(((energy - self.energy_j) ** 2).mean())}
 
 
 @dataclass(frozen=True)
-class SixSixSix(ContactScene):
-    """A cube of 6 x 6 x 6 balls, a little disturbed, collapses; how deep do they overlap?
-
-    Attributes:
-        lowest_m: height of the lowest layer's centres, before the disturbance.
-        friction: of every contact.
-    """
+class SixSixSix(scene.ContactScene):
+    """A cube of 6 x 6 x 6 balls, a little disturbed, collapses; how deep do they overlap?"""
 
     lowest_m: float = 0.101
+    """Height of the lowest layer's centres, before the disturbance."""
     friction: float = 0.0
 
     side = 6
@@ -243,109 +161,46 @@ class SixSixSix(ContactScene):
         """Squared overlap of all balls at the origin, which SimBenchmark's first sample shows."""
         return squared_penetration(np.zeros((self.side**3, 3)), self.radius_m)
 
-    def _trial(self, method: MujocoMethod, dt_s: float) -> MujocoTrial:
-        spec = benchmark_spec(method, dt_s)
+    timed_s = (1.0, 1.5)
+    """While the pile falls apart."""
+
+    def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
+        spec = benchmark_spec(method, dt_s, self.friction)
         # Deep piles have many contacts at large steps.
         spec.memory = 2**28
-        add_plane(spec, self.friction)
         random = np.random.default_rng(self.seed)
         lowest = np.array([0.0, 0.0, self.lowest_m])
         # SimBenchmark's file for MuJoCo widens the impedance's range; see its sphere XML.
         contact = rubbing(self.friction) | {"solimp": [0.9, 0.9, 0.01, 0.5, 2.0]}
         for place in np.ndindex(self.side, self.side, self.side):
             at = self.gap_m * np.array(place) + self.disturbance_m * random.random(3) + lowest
-            add_sphere(spec, at.tolist(), self.radius_m, self.ball_kg, **contact)
-        total = steps_of(self.horizon_s, dt_s)
+            scene.add_ball(spec, at, self.radius_m, self.ball_kg, **contact)
+        return spec
 
-        def judge(path: simulate.Path) -> Mapping[str, float]:
-            places = path.qpos.reshape(total + 1, -1, 7)[:-1, :, :3]
-            squares = np.array([squared_penetration(one, self.radius_m) for one in places])
-            mean = float(squares.mean())
-            as_published = mean + (self.empty_sample_m2 - squares[0]) / total
-            return {"penetration": mean, "as_published": float(as_published)}
-
-        # Timed from 1 s to 1.5 s, while the pile falls apart.
-        before, part = steps_of(1.0, dt_s), steps_of(0.5, dt_s)
-        plan = [Held(np.empty(0), steps) for steps in (before, part, total - before - part)]
-        return MujocoTrial(
-            spec.compile(), lambda _data: None, plan, judge, self._names, slice(1, 2)
-        )
+    def judge(self, path: Path, method: MujocoMethod) -> Mapping[str, float]:
+        """Return the mean over time of the squared penetration, m², and as it was published."""
+        places = path.qpos[:-1].reshape(len(path.qpos) - 1, -1, 7)[:, :, :3]
+        squares = np.array([squared_penetration(one, self.radius_m) for one in places])
+        published = np.array([self.empty_sample_m2, *squares[1:]])
+        return {"penetration": float(squares.mean()), "as_published": float(published.mean())}
 
 
 def squared_penetration(centres: Float64, radius_m: float) -> float:
-    """Return the sum of squared overlaps, m², of balls with each other and with the ground.
-
-    Args:
-        centres: (balls, 3) metres.
-        radius_m: of every ball.
-    """
+    """Return the sum of squared overlaps, m², of balls at (balls, 3) m, and with the ground."""
     balls = np.maximum(2.0 * radius_m - pdist(centres), 0.0)
     ground = np.maximum(radius_m - centres[:, 2], 0.0)
     return float((balls**2).sum() + (ground**2).sum())
 
 
-_ROLLING_STEPS_S: Final = (0.02, 0.01, 0.005, 0.002, 0.001)
-_ROLLING_MEASURES: Final = (
-    Measure("velocity", "mean squared velocity error over 4 s, (m/s)²", "model"),
-)
-_PILE_MEASURES: Final = (
-    Measure("penetration", "mean squared penetration over 10 s, m²", "model"),
-    Measure("as_published", "the same with SimBenchmark's empty first sample, m²", "model"),
-)
-
-
-def _rolling(name: str, said: str, direction: tuple[float, float]) -> Rolling:
-    return Rolling(
-        name=name,
-        title=f"SimBenchmark rolling: a box under 25 balls is pushed, {said}",
-        horizon_s=4.0,
-        measures=_ROLLING_MEASURES,
-        methods=(*MUJOCO, *PYRAMIDAL),
-        time_steps_s=_ROLLING_STEPS_S,
-        # A third of that of a box which does not move, 3.14.
-        failure=1.0,
-        direction=direction,
-    )
-
-
-ROLLING_Y: Final = _rolling("rolling-y", "along y", (0.0, 1.0))
-ROLLING_XY: Final = _rolling("rolling-xy", "60° from x", (0.5, math.sqrt(0.75)))
-BOUNCING: Final = Bouncing(
-    name="bouncing",
-    title="SimBenchmark bouncing: 49 balls drop 5 m, elasticity 1",
-    horizon_s=20.0,
-    measures=(Measure("energy", "mean squared energy error over 20 s, J²", "model"),),
-    methods=MUJOCO,
-    time_steps_s=(0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001),
-    # That of balls which lose half their energy.
-    failure=(0.5 * 49 * 10.0 * GRAVITY_M_S2 * 5.0) ** 2,
-)
-PILE: Final = SixSixSix(
-    name="666",
-    title="SimBenchmark 666: 216 smooth balls collapse",
-    horizon_s=10.0,
-    measures=_PILE_MEASURES,
-    methods=MUJOCO,
-    time_steps_s=(0.1, 0.05, 0.02, 0.01, 0.005),
-    # About that of 216 balls which overlap every neighbour by a fifth of their diameter.
-    failure=1.0,
-)
+ROLLING_Y: Final = Rolling(**scene.described("rolling-y"))
+ROLLING_XY: Final = Rolling(**scene.described("rolling-xy"), direction=(0.5, math.sqrt(0.75)))
+BOUNCING: Final = Bouncing(**scene.described("bouncing"))
+PILE: Final = SixSixSix(**scene.described("666"))
 DROPPED_PILE: Final = SixSixSix(
-    name="666-dropped",
-    title="SimBenchmark 666 as its MuJoCo file has it: dropped from 1.2 m, friction 0.8",
-    horizon_s=10.0,
-    measures=_PILE_MEASURES,
+    **scene.described("666-dropped"),
     methods=(MujocoMethod("Euler"), MujocoMethod("RK4")),
-    time_steps_s=(0.1, 0.02, 0.01),
-    failure=1.0,
     lowest_m=1.311,
     friction=0.8,
 )
 
-SIMBENCHMARK: Final[Sequence[ContactScene]] = (
-    ROLLING_Y,
-    ROLLING_XY,
-    BOUNCING,
-    PILE,
-    DROPPED_PILE,
-)
+SCENES: Final = (ROLLING_Y, ROLLING_XY, BOUNCING, PILE, DROPPED_PILE)

@@ -1,5 +1,5 @@
 """Where methods break: limits predicted and then found, failures with their cures, hard cases.
 
-`limits` has the table of predicted limits, `failures` a picture for every way to fail,
-`hard_cases` what the game's own levels can do to the ball. ``scripts/stability.py`` runs all.
+``scripts/stability.py`` runs all of `smooth`, `contacts`, `failures` and `hard_cases`; what people
+read of a case is in the CSV file of its table.
 """
