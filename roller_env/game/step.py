@@ -38,8 +38,8 @@ INTRO_S: Final = SPLASH_S + 5.0
 """Time from loading a level to control: the splash screen, then five seconds of the intro panel."""
 
 HANGING_S: Final = SPLASH_S + frames(10.0)
-"""Time from loading a level to a physical ball: `roller` waits 10 frames, which the splash holds up.
-Until then nothing moves and nothing happens."""
+"""Time from loading a level to a physical ball: `roller` waits 10 frames, which the splash holds
+up. Until then nothing moves and nothing happens."""
 
 _COIN, _FINISH, _FALL, _PROGRESS = (REWARD_TERMS.index(name) for name in REWARD_TERMS)
 

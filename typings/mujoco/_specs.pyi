@@ -38,6 +38,7 @@ class MjsPair:
     friction: Array[np.float64]
     geomname1: str
     geomname2: str
+    solimp: Array[np.float64]
     solref: Array[np.float64]
     solreffriction: Array[np.float64]
 
@@ -65,6 +66,7 @@ class MjsBody:
     pos: Array[np.float64]
     quat: Array[np.float64]
     bodies: list[MjsBody]
+    joints: list[MjsJoint]
     geoms: list[MjsGeom]
     def add_body(self, **fields: Any) -> MjsBody: ...
     def add_freejoint(self, **fields: Any) -> MjsJoint: ...
@@ -81,6 +83,7 @@ class MjSpec:
     visual: MjVisual
     worldbody: MjsBody
     bodies: list[MjsBody]
+    joints: list[MjsJoint]
     geoms: list[MjsGeom]
     materials: list[MjsMaterial]
     pairs: list[MjsPair]
