@@ -19,7 +19,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.compile.compiled import CompiledLevel
+from roller_env.level.schema import Level
+from roller_env.physics.presets import PhysicsPreset
 
 Float64 = npt.NDArray[np.float64]
 
@@ -44,16 +45,16 @@ def reports_in(directory: Path) -> Iterator[None]:
             os.environ[REPORTS_VARIABLE] = before
 
 
-def report(compiled: CompiledLevel, state: Float64, ctrl: Float64) -> str:
+def report(level: Level, preset: PhysicsPreset, state: Float64) -> str:
     """Keep what is needed to repeat steps that failed, if it is wanted, and say where it is.
 
-    The file, ``diverged-<number>.npz``, has the arrays ``state`` and ``ctrl``, and ``level`` (JSON)
-    and ``preset`` as text. Never raises: a game that diverged is to end, whatever the disk does.
+    The file, ``diverged-<number>.npz``, has an array ``state``, and ``level`` (JSON) and ``preset``
+    as text. Never raises: a game that diverged is to end, whatever the disk does.
 
     Args:
-        compiled: the level that was played.
-        state: (n, nstate) MuJoCo's integration states before the step.
-        ctrl: (n, nu) the controls.
+        level: that was played.
+        preset: the settings of the physics.
+        state: (n, width) the engine's states before the step, its controls among them.
 
     Returns:
         Where the report is, or why there is none; the end of a sentence.
@@ -65,9 +66,8 @@ def report(compiled: CompiledLevel, state: Float64, ctrl: Float64) -> str:
     np.savez_compressed(
         content,
         state=state,
-        ctrl=ctrl,
-        level=np.array(compiled.level.model_dump_json()),
-        preset=np.array(repr(compiled.preset)),
+        level=np.array(level.model_dump_json()),
+        preset=np.array(repr(preset)),
     )
     try:
         file = _write(Path(directory), content.getvalue())

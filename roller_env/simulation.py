@@ -12,11 +12,10 @@ import numpy.typing as npt
 
 from roller_env import checks
 from roller_env.arrays import Bool, Float32, Float64, Int64
-from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.config import MAX_ENVS, EnvConfig
 from roller_env.divergence import report
 from roller_env.game import observations, step
-from roller_env.game.bodies import Bodies, Columns
+from roller_env.game.bodies import Bodies
 from roller_env.game.result import REWARD_TERMS, EpisodeResult
 from roller_env.game.state import GameState, score_percent
 from roller_env.game.step import Games, Rewarding
@@ -24,13 +23,32 @@ from roller_env.game.tables import LevelTable
 from roller_env.level import Level, load_level
 from roller_env.level.check import obstacles, obstructions
 from roller_env.physics.presets import PhysicsPreset
-from roller_env.physics.stepper import Stepper
+from roller_env.physics.protocol import Columns, Physics
 from roller_env.pieces.coin import COIN
 from roller_env.pieces.fields import MAX_COORDINATE_M
 from roller_env.pieces.gate import GATE
 from roller_env.pieces.piece import Solid
 from roller_env.pieces.plate import PLATE
 from roller_env.pieces.rules import Rules
+
+
+def make_physics(
+    level: Level, preset: PhysicsPreset, num_envs: int, substeps: int, num_threads: int
+) -> Physics:
+    """Return the engine that a preset names, with worlds of a level.
+
+    Args:
+        level: that `roller_env.level.load_level` has accepted.
+        preset: the settings.
+        num_envs: number of worlds.
+        substeps: physics steps in a control step.
+        num_threads: native threads; 0 means one for each CPU.
+    """
+    # Here, since one engine needs not what the other is made of.
+    from roller_env.compile.compiled import compile_level
+    from roller_env.compile.physics import MujocoPhysics
+
+    return MujocoPhysics(compile_level(level, preset), num_envs, substeps, num_threads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +60,8 @@ class Snapshot:
 
     Attributes:
         level: what is played.
-        physics: (n, nstate) float64, MuJoCo's integration state.
+        physics: (n, width) float64, the engine's state.
+        columns: where everything is in it.
         game: the rules', the cameras' and the shaping's.
         level_of_row: (n,) which level each row plays.
         generators: the random generators' states.
@@ -52,6 +71,7 @@ class Snapshot:
 
     level: Level
     physics: Float64
+    columns: Columns
     game: GameState
     level_of_row: Int64
     generators: tuple[dict[str, Any], ...]
@@ -61,6 +81,11 @@ class Snapshot:
     def __len__(self) -> int:
         """Return the number of rows."""
         return len(self.physics)
+
+    @property
+    def bodies(self) -> Bodies:
+        """Where the balls and slabs are; views of `physics`, to read or to write to."""
+        return Bodies.of(self.physics, self.columns)
 
     def take(self, rows: npt.ArrayLike) -> Snapshot:
         """Return the snapshot of some of the rows, each as often as it is named.
@@ -128,7 +153,8 @@ class Simulation:
 
     Attributes:
         config: the options.
-        compiled: the level and its model.
+        level: what is played.
+        preset: the settings of the physics.
         state: the game's state; read it, and change it only through `restore`.
         table: the level data of every row.
         num_envs: N.
@@ -144,7 +170,7 @@ class Simulation:
         """
         self.config = config
         self.num_envs = checks.whole("num_envs", num_envs, 1, MAX_ENVS)
-        self.compiled: CompiledLevel = compile_level(load_level(config.level), config.physics)
+        self.level: Level = load_level(config.level)
         self.divergences = 0
         self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
         self._make_games()
@@ -152,42 +178,23 @@ class Simulation:
     def _make_games(self) -> None:
         """Make the games of which no episode has begun, from what cannot be computed anew."""
         config, num_envs = self.config, self.num_envs
-        self._duration_s = config.substeps * self.compiled.preset.dt_s
-        self.table = LevelTable.of_levels([self.compiled.level])
+        self.preset = config.preset
+        self._duration_s = config.substeps * self.preset.dt_s
+        self.table = LevelTable.of_levels([self.level])
         level_of = np.zeros(num_envs, dtype=np.int64)
         self._games = Games(self.table, level_of, self._episode_lengths(level_of))
         self.state = self._games.state
-        self._stepper = Stepper(self.compiled.model, num_envs, config.substeps, config.num_threads)
-        self._at = self._columns()
-        self._bodies = Bodies.of(self._stepper.state, self._at)
+        self._physics = make_physics(
+            self.level, self.preset, num_envs, config.substeps, config.num_threads
+        )
+        self._at = self._physics.columns
+        self._bodies = Bodies.of(self._physics.state, self._at)
         self._rewarding = Rewarding(
             np.array(config.reward_weights.terms), config.reward == "shaped", config.discount
         )
         self._every = np.arange(num_envs)
         self._ray_directions = observations.ray_directions()
         self._scan_offsets = observations.scan_offsets()
-
-    def _columns(self) -> Columns:
-        """Return where the rules find things in MuJoCo's integration state.
-
-        MuJoCo numbers joints and actuators in the order in which the level's spec adds them: the
-        ball's, then those of the plates and of the gates.
-        """
-        first, compiled = self._stepper.first_columns, self.compiled
-        position = first["qpos"] + compiled.ball_qpos
-        velocity = first["qvel"] + compiled.ball_qvel
-        return Columns(
-            position=position,
-            orientation=position + 3,
-            velocity=velocity,
-            angular_velocity=velocity + 3,
-            displacement=position + 7,
-            aim=first["act"],
-            force_n=first["ctrl"],
-            pull=first["ctrl"] + 3,
-            movers=self.table.movers.stop.shape[1],
-            path=compiled.ball_qpos,
-        )
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a copy is made of; it goes on with the same bits, and on its own.
@@ -198,7 +205,7 @@ class Simulation:
         return {
             "config": self.config,
             "num_envs": self.num_envs,
-            "compiled": self.compiled,
+            "level": self.level,
             "divergences": self.divergences,
             "_generators": self._generators,
             "snapshot": self.snapshot(),
@@ -254,8 +261,12 @@ class Simulation:
 
     @property
     def qpos(self) -> Float64:
-        """(N, nq) copy of MuJoCo's positions, for drawing."""
-        return self._stepper.qpos.copy()
+        """(N, 7 + M) copy of where the ball is, how it is turned, and where the slabs are.
+
+        So MuJoCo has it in its ``qpos``, which pictures are drawn by.
+        """
+        bodies = self._bodies
+        return np.concatenate([bodies.position, bodies.orientation, bodies.displacement], axis=1)
 
     @property
     def time_s(self) -> Float64:
@@ -333,7 +344,7 @@ class Simulation:
         order = np.argsort(rows)
         rows = rows[order]
         level = self._games.level_of[rows]
-        self._stepper.reset(rows)
+        self._physics.reset(rows)
         jitter = np.array([self._generators[row].uniform(-1.0, 1.0, 2) for row in rows])
         start = self.table.start[level]
         start[:, :2] += jitter * self.table.jitter[level]
@@ -376,7 +387,7 @@ class Simulation:
         return Placement(position, velocity, angular_velocity, coin_left)
 
     def _check_positions(self, position: Float64) -> None:
-        level = self.compiled.level
+        level = self.level
         for ball in position[position[:, 2] <= level.kill_height]:
             raise ValueError(
                 f"position: found {ball.tolist()}; must be above the level's kill height, "
@@ -390,7 +401,7 @@ class Simulation:
 
     @cached_property
     def _obstacles(self) -> tuple[Solid, ...]:
-        return obstacles(self.compiled.level)
+        return obstacles(self.level)
 
     def _place(self, rows: Int64, placement: Placement) -> None:
         """Put the balls of rows that were just reset where a placement says."""
@@ -434,20 +445,20 @@ class Simulation:
         """Step ``rows``; None: all."""
         every: Int64 | slice = slice(None) if rows is None else rows
         envs = self._every if rows is None else rows
-        before = self._stepper.state[every].copy()
-        games, duration_s, physics = self._games, self.duration_s, self._stepper.state
+        games, duration_s, physics = self._games, self.duration_s, self._physics.state
         step.prepare(games.preparing, envs, duration_s, force_n, physics, self._at)
-        hanging = self._games.hanging_s[every]
-        path = self._let_go(rows, hanging) if hanging.any() else self._stepper.advance(rows)
-        diverged = self._stepper.diverged()[every] | ~np.isfinite(path[:, -1]).all(axis=1)
+        before = physics[every].copy()
+        hanging = games.hanging_s[every]
+        path = self._let_go(rows, hanging) if hanging.any() else self._physics.advance(rows)
+        diverged = self._physics.diverged()[every] | ~np.isfinite(path[:, -1]).all(axis=1)
         if diverged.any():
             self._end_diverged(envs[diverged], path, diverged, before)
         step.conclude(games.concluding, envs, duration_s, path, physics, self._at, self._rewarding)
 
     def _let_go(self, rows: Int64 | None, hanging_s: Float64) -> Float64:
         """Advance rows of which some begin to move only after ``hanging_s``, (n,); return paths."""
-        still = np.rint(hanging_s / self.compiled.preset.dt_s).astype(np.int64)
-        return self._stepper.advance_late(rows, np.minimum(still, self._stepper.substeps))
+        still = np.rint(hanging_s / self.preset.dt_s).astype(np.int64)
+        return self._physics.advance_late(rows, np.minimum(still, self._physics.substeps))
 
     def _measure_potential(self, rows: Int64, follows: Bool) -> None:
         """Set the potential of rows whose ball was put somewhere.
@@ -462,7 +473,7 @@ class Simulation:
                 self.table.routes,
                 self._games.level_of,
                 rows,
-                self._stepper.state,
+                self._physics.state,
                 self._at,
                 weight,
                 follows,
@@ -478,19 +489,19 @@ class Simulation:
             rows: (m,) which.
             path: (n, S + 1, nq) of the n rows that were stepped.
             diverged: (n,) which of those are ``rows``.
-            before: (n, nstate) physics before the step.
+            before: (n, width) the state of the physics before the step.
         """
         self.divergences += len(rows)
-        kept = report(self.compiled, before[diverged], self._stepper.ctrl[rows])
+        kept = report(self.level, self.preset, before[diverged])
         warnings.warn(
-            f"{len(rows)} game(s) of level {self.compiled.level.name!r} diverged and were ended; "
-            f"{kept}",
+            f"{len(rows)} game(s) of level {self.level.name!r} diverged and were ended; {kept}",
             RuntimeWarning,
             stacklevel=4,
         )
-        self._stepper.reset(rows)
+        self._physics.reset(rows)
         self._bodies.position[rows] = self.table.start[self._games.level_of[rows]]
-        path[diverged] = self._stepper.qpos[rows][:, None, :]
+        at = self._at.path
+        path[diverged, :, at : at + 3] = self._bodies.position[rows][:, None, :]
         self.state.diverged[rows] = True
 
     # What is seen ----------------------------------------------------------------------------
@@ -503,17 +514,17 @@ class Simulation:
         envs = self._every if rows is None else np.asarray(rows)
         size = sum(entry.size for entry in observations.entries(self.config.observation))
         out = np.zeros((len(envs), size), dtype=np.float32)
-        step.observe(self._games.showing, envs, self._stepper.state, self._at, out)
+        step.observe(self._games.showing, envs, self._physics.state, self._at, out)
         if self.config.observation == "rays":
             out[:, observations.STATE_SIZE :] = self._cast_rays(rows, envs)
         return out
 
     def _cast_rays(self, rows: Int64 | None, envs: Int64) -> Float32:
-        ball, body = self._bodies.position[envs], self.compiled.ball_body
+        ball = self._bodies.position[envs]
         level_origins = np.broadcast_to(ball[:, None, :], (len(ball), len(self._ray_directions), 3))
-        level_rays = self._stepper.rays(level_origins, self._ray_directions, body, rows)
+        level_rays = self._physics.rays(level_origins, self._ray_directions, rows)
         down = np.broadcast_to([0.0, 0.0, -1.0], self._scan_offsets.shape)
-        scan = self._stepper.rays(ball[:, None, :] + self._scan_offsets, down, body, rows)
+        scan = self._physics.rays(ball[:, None, :] + self._scan_offsets, down, rows)
         radius = self.table.ball_radius[self._games.level_of[envs]]
         return observations.ray_observation(level_rays, scan, radius)
 
@@ -530,12 +541,13 @@ class Simulation:
         """Return all that the future of ``rows`` (all, if None) depends on, as copies."""
         rows = np.arange(self.num_envs) if rows is None else self._checked(rows)
         return Snapshot(
-            level=self.compiled.level,
-            physics=self._stepper.state[rows].copy(),
+            level=self.level,
+            physics=self._physics.state[rows].copy(),
+            columns=self._at,
             game=self.state.copy_rows(rows),
             level_of_row=self._games.level_of[rows].copy(),
             generators=tuple(self._generators[row].bit_generator.state for row in rows),
-            preset=self.compiled.preset,
+            preset=self.preset,
             control_dt_s=self.config.control_dt_s,
         )
 
@@ -552,8 +564,8 @@ class Simulation:
         rows = self._checked(np.arange(count) if rows is None else rows)
         if len(rows) != count:
             raise ValueError(f"rows: found {len(rows)} for a snapshot of {count}")
-        self._stepper.reset(np.sort(rows))
-        self._stepper.state[rows] = snapshot.physics
+        self._physics.reset(np.sort(rows))
+        self._physics.state[rows] = snapshot.physics
         self.state.set_rows(rows, snapshot.game)
         self._games.level_of[rows] = snapshot.level_of_row
         for row, generator in zip(rows, snapshot.generators, strict=True):
@@ -571,24 +583,24 @@ class Simulation:
         """
         if not isinstance(snapshot, Snapshot):
             raise TypeError(f"snapshot: found {type(snapshot)}; must be a {Snapshot.__name__}")
-        theirs, ours = snapshot.level, self.compiled.level
+        theirs, ours = snapshot.level, self.level
         if theirs is not ours and theirs != ours:
             other = "another" if theirs.name == ours.name else "one"
             raise ValueError(
                 f"snapshot: found {other} of level {theirs.name!r}; this simulation plays "
                 f"{ours.name!r}"
             )
-        if snapshot.preset != self.compiled.preset:
+        if snapshot.preset != self.preset:
             raise ValueError(
                 f"snapshot: found one of the physics {snapshot.preset}; this simulation has "
-                f"{self.compiled.preset}"
+                f"{self.preset}"
             )
         if snapshot.control_dt_s != self.config.control_dt_s:
             raise ValueError(
                 f"snapshot: found one with control_dt_s {snapshot.control_dt_s:g}; this simulation "
                 f"has {self.config.control_dt_s:g}"
             )
-        width = self._stepper.state.shape[1]
+        width = self._physics.state.shape[1]
         if snapshot.physics.shape[1:] != (width,):
             raise ValueError(
                 f"snapshot: found physics of shape {snapshot.physics.shape}, of another version of "

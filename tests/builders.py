@@ -13,6 +13,7 @@ from roller_env.config import EnvConfig
 from roller_env.game.actions import forces, held_keys
 from roller_env.game.observations import STATE_ENTRIES, split
 from roller_env.level import Level, check_level
+from roller_env.level.expand import expand
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.physics.stepper import Stepper
 from roller_env.simulation import Simulation, Transition
@@ -138,12 +139,9 @@ class Game:
     def place(self, at: Vector, velocity: Vector = (0.0, 0.0, 0.0)) -> None:
         """Put every game's ball somewhere, with a velocity and without spin."""
         snapshot = self.simulation.snapshot()
-        compiled = self.simulation.compiled
-        # MuJoCo's integration state begins with time, qpos and qvel.
-        qpos, qvel = 1 + compiled.ball_qpos, 1 + compiled.model.nq + compiled.ball_qvel
-        snapshot.physics[:, qpos : qpos + 3] = at
-        snapshot.physics[:, qvel : qvel + 3] = velocity
-        snapshot.physics[:, qvel + 3 : qvel + 6] = 0.0
+        snapshot.bodies.position[:] = at
+        snapshot.bodies.velocity[:] = velocity
+        snapshot.bodies.angular_velocity[:] = 0.0
         self.simulation.restore(snapshot)
 
     def step(self, keys: str = "") -> Transition:
@@ -162,8 +160,8 @@ class Game:
 
     def slab(self, name: str) -> float:
         """Return the displacement of the first game's plate or gate ``name``, metres."""
-        joint = self.simulation.compiled.model.joint(name)
-        return float(self.simulation.qpos[0, joint.qposadr[0]])
+        names = [mover.name for mover in expand(self.simulation.level).movers]
+        return float(self.simulation.qpos[0, 7 + names.index(name)])
 
     def observed(self, name: str) -> npt.NDArray[np.float32]:
         """Return one entry of the first game's observation."""

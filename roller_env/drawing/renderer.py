@@ -97,8 +97,7 @@ class GameRenderer:
 
     def _open(self) -> tuple[Stage, Canvas]:
         if self._canvas is None or self._stage is None:
-            compiled = self._simulation.compiled
-            stage = Stage(compiled.level, compiled.preset)
+            stage = Stage(self._simulation.level, self._simulation.preset)
             visual, small = stage.model.vis, min(self._size) < SMALL_PICTURE_PIXELS
             visual.global_.fovy = FIELD_OF_VIEW_DEG
             visual.map.shadowclip = SHADOW_REACH_SMALL_M if small else SHADOW_REACH_M

@@ -106,7 +106,7 @@ class RollerVecEnv(VecEnv):
     @property
     def level(self) -> Level:
         """The level that all rows play."""
-        return self.vector.simulation.compiled.level
+        return self.vector.simulation.level
 
     def reset(self) -> Any:
         """Begin an episode in every row, with what `seed` and `set_options` were given.

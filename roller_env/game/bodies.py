@@ -8,34 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from roller_env.arrays import Float64
-
-
-class Columns(NamedTuple):
-    """Where things begin in a row of the physics' state.
-
-    Attributes:
-        position: ball's centre, 3: metres, world frame.
-        orientation: 4: unit quaternion (w, x, y, z), ball to world.
-        velocity: 3: m/s, world frame.
-        angular_velocity: 3: rad/s, in the ball's own frame.
-        displacement: one a slab: how far it is from where it began, metres, <= 0.
-        aim: one a slab: displacement to which it is being pulled, which it trails.
-        force_n: 3, a control: mean force on the ball over the step, newtons, world frame.
-        pull: one a slab, a control: m/s at which its aim moves; below zero is down.
-        movers: number of slabs.
-        path: where the ball's centre begins in a row of the path that a step leaves.
-    """
-
-    position: int
-    orientation: int
-    velocity: int
-    angular_velocity: int
-    displacement: int
-    aim: int
-    force_n: int
-    pull: int
-    movers: int
-    path: int
+from roller_env.physics.protocol import Columns
 
 
 class Bodies(NamedTuple):

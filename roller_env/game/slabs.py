@@ -14,8 +14,8 @@ import numpy as np
 
 from roller_env.arrays import Float64
 from roller_env.compiled import device_function
-from roller_env.game.bodies import Columns
 from roller_env.game.tables import Movers
+from roller_env.physics.protocol import Columns
 
 BRAKING_M_S2: Final = 5.0
 """How hard a slab brakes for a ball under it: a twentieth of what its servo can do, so that it

@@ -16,7 +16,6 @@ import numpy as np
 
 from roller_env.arrays import Bool, Float32, Float64, Int64
 from roller_env.compiled import compiled_with_packages, device_function, inlined
-from roller_env.game.bodies import Columns
 from roller_env.game.cameras import settle
 from roller_env.game.kinds import all_hooks
 from roller_env.game.observations import STATE_SIZE, rotated
@@ -25,6 +24,7 @@ from roller_env.game.rewards import ShapingState, next_waypoint, route_progress,
 from roller_env.game.slabs import lowering
 from roller_env.game.state import GameState
 from roller_env.game.tables import LevelTable, Movers, Regions, Routes
+from roller_env.physics.protocol import Columns
 from roller_env.pieces.rules import WORK, After, Before, CameraAsked, Noticed, Seen
 from roller_env.pieces.sweep import bounds, meets, time_of_fall, vector, visit
 from roller_env.units import frames

@@ -9,7 +9,7 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
-from roller_env.compile.compiled import CompiledLevel
+from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.config import EnvConfig
 from roller_env.game.actions import forces, held_keys
 from roller_env.lab.simulate import Float64, record, started
@@ -174,7 +174,7 @@ def played(
     simulation = Simulation(config)
     simulation.seed([np.random.default_rng(seed)])
     simulation.reset()
-    model = simulation.compiled.model
+    model = compile_level(simulation.level, simulation.preset).model
     data = mujoco.MjData(model)
     start, ctrl = simulation.ball_position[0].copy(), []
     for held, seconds in keys:

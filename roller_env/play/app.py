@@ -200,10 +200,10 @@ class GamePlugin(plugin.SimPlugin):
         self._publish()
 
     def _publish(self) -> None:
-        compiled = self._session.compiled
-        scene = PlayScene(compiled.level, compiled.preset, self._quality)
+        level, preset = self._session.level, self._session.preset
+        scene = PlayScene(level, preset, self._quality)
         self.handle.set_model(scene.model)
-        self.handle.send_to_viewer(SceneEvent(scene, compiled.level, self._choice))
+        self.handle.send_to_viewer(SceneEvent(scene, level, self._choice))
         self._looked_s = time.monotonic()
 
 
@@ -309,7 +309,7 @@ class ScreenPlugin(plugin.ViewerPlugin):
         elapsed = frame.clock_s - self._shown.clock_s if self._shown is not None else 0.0
         view = self.camera.follow(
             int(frame.state.camera.mode[0]),
-            qpos[frame.ball : frame.ball + 3],
+            qpos[:3],
             elapsed,
         )
         _copy_camera(viewer.camera, look(view.position, view.target))

@@ -11,7 +11,8 @@ from typing import Any, ClassVar, Final, cast
 from mujoco.studio import messages
 from mujoco.studio.dear_imgui import dear_imgui as imgui
 
-from roller_env.compile.compiled import CompiledLevel
+from roller_env.level.schema import Level
+from roller_env.physics.presets import PhysicsPreset
 from roller_env.play import panels
 from roller_env.play.app import Choices, GamePlugin, SceneEvent, ScreenPlugin
 from roller_env.play.panels import Choice, Wish
@@ -69,9 +70,14 @@ class ReplaySession:
         self._show()
 
     @property
-    def compiled(self) -> CompiledLevel:
-        """The level as it is played."""
-        return self._playback.simulation.compiled
+    def level(self) -> Level:
+        """What is played."""
+        return self._playback.simulation.level
+
+    @property
+    def preset(self) -> PhysicsPreset:
+        """The settings of the physics."""
+        return self._playback.simulation.preset
 
     @property
     def duration_s(self) -> float:
@@ -126,7 +132,7 @@ class ReplaySession:
         simulation = self._playback.simulation
         step_s = simulation.duration_s
         return GameFrame(
-            level=self.compiled.level,
+            level=self.level,
             phase=self.phase,
             episode=self._rewinds,
             before=self._before,
@@ -134,7 +140,6 @@ class ReplaySession:
             fraction=min(max(self.time_s / step_s - self._step, 0.0), 1.0),
             made_s=time.monotonic(),
             step_s=step_s,
-            ball=self.compiled.ball_qpos,
             state=simulation.state.copy_rows(),
             clock_s=self._scenery_s,
             result=simulation.result(),

@@ -18,7 +18,6 @@ import numpy as np
 from gymnasium.utils import seeding
 
 from roller_env.arrays import Float64
-from roller_env.compile.compiled import CompiledLevel
 from roller_env.config import EnvConfig, LevelSource
 from roller_env.game.actions import action_of_keys, forces
 from roller_env.game.result import EpisodeResult
@@ -77,12 +76,12 @@ class GameFrame:
         level: what is played.
         phase: what the game is doing.
         episode: number of this episode in the session, from 0.
-        before: (nq,) positions before the last control step.
-        after: (nq,) positions after it.
+        before: (7 + M,) before the last control step: the ball's centre and orientation, and the
+            slabs' displacements.
+        after: (7 + M,) after it.
         fraction: 0 to 1, how far between the two the picture was when the frame was made.
         made_s: when that was, by `time.monotonic`.
         step_s: length of a control step.
-        ball: index of the ball's x in ``before`` and ``after``.
         state: the game's, of one row.
         clock_s: time that scenery moves by; it stands still only in a pause.
         result: how the episode stands.
@@ -101,7 +100,6 @@ class GameFrame:
     fraction: float
     made_s: float
     step_s: float
-    ball: int
     state: GameState
     clock_s: float
     result: EpisodeResult
@@ -124,9 +122,8 @@ class GameFrame:
             fraction += (now_s - self.made_s) / self.step_s
         fraction = min(max(fraction, 0.0), 1.0)
         drawn = self.before + fraction * (self.after - self.before)
-        centre, turn = slice(self.ball, self.ball + 3), slice(self.ball + 3, self.ball + 7)
-        poses = [Pose(qpos[None, centre], qpos[None, turn]) for qpos in (self.before, self.after)]
-        drawn[turn] = interpolate(poses[0], poses[1], fraction).orientation[0]
+        poses = [Pose(qpos[None, :3], qpos[None, 3:7]) for qpos in (self.before, self.after)]
+        drawn[3:7] = interpolate(poses[0], poses[1], fraction).orientation[0]
         return drawn
 
 
@@ -189,14 +186,19 @@ class GameSession:
     # What can be read ------------------------------------------------------------------------
 
     @property
+    def level(self) -> Level:
+        """What is played."""
+        return self.simulation.level
+
+    @property
+    def preset(self) -> PhysicsPreset:
+        """The settings of the physics."""
+        return self.simulation.preset
+
+    @property
     def config(self) -> EnvConfig:
         """The options of the simulation."""
         return self.simulation.config
-
-    @property
-    def compiled(self) -> CompiledLevel:
-        """The level as it is played."""
-        return self.simulation.compiled
 
     @property
     def seed(self) -> int:
@@ -217,7 +219,7 @@ class GameSession:
         """Return what is to be drawn now."""
         state = self.simulation.state
         return GameFrame(
-            level=self.compiled.level,
+            level=self.level,
             phase=self.phase,
             episode=self.episode,
             before=self._before,
@@ -225,7 +227,6 @@ class GameSession:
             fraction=self._pacer.fraction if self.phase is not Phase.ENDED else 1.0,
             made_s=time.monotonic(),
             step_s=self.simulation.duration_s,
-            ball=self.compiled.ball_qpos,
             state=state.copy_rows(),
             clock_s=self._scenery_s,
             result=self.result,

@@ -150,7 +150,7 @@ def _compare(simulation: Simulation, replays: list[Replay], step: int) -> None:
     ]
     if others:
         raise ReplayError(
-            f"{len(others)} of {len(replays)} replays of level {simulation.compiled.level.name!r} "
+            f"{len(others)} of {len(replays)} replays of level {simulation.level.name!r} "
             f"are other games at step {step}, in {', '.join(others[0])}: they were recorded with "
             "other versions, which 'roller replay' names"
         )

@@ -57,7 +57,7 @@ class Recorder:
         self._player = player
         self._every = check_every or interval_of(simulation.duration_s)
         self._takes: dict[int, _Take] = {}
-        self._options = recorded_options(simulation.config, simulation.compiled.level)
+        self._options = recorded_options(simulation.config, simulation.level)
 
     def begin(self, rows: Sequence[int] | Int64 = (0,), seed: int | None = None) -> None:
         """Record ``rows`` from here on, whose episodes have just begun.
@@ -172,9 +172,7 @@ def place_at_starts(simulation: Simulation, starts: Float64, intro: bool) -> Non
     """
     simulation.reset(intro=intro)
     snapshot = simulation.snapshot()
-    # MuJoCo's integration state begins with the time and then qpos.
-    ball = 1 + simulation.compiled.ball_qpos
-    snapshot.physics[:, ball : ball + 3] = starts
+    snapshot.bodies.position[:] = starts
     simulation.restore(snapshot)
 
 

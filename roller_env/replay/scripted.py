@@ -118,7 +118,7 @@ class ScriptedPlayer:
         distance = math.hypot(*way)
         speed = min(CRUISE_M_S, math.sqrt(final_speed**2 + 2.0 * BRAKING_M_S2 * distance))
         wanted = way / max(distance, 1e-9) * speed
-        mass = simulation.compiled.level.ball.mass_kg
+        mass = simulation.level.ball.mass_kg
         push = mass * (wanted - velocity) / RESPONSE_S
         best = self._with_noise(int(np.linalg.norm(_PUSHES - push, axis=1).argmin()))
         return _PUSHES[best : best + 1].copy()

@@ -142,7 +142,7 @@ def evaluate(
             ended[row].append(recorder.replay(int(row)))
             to_play[row] -= 1
     return Evaluation(
-        level=envs.simulation.compiled.level,
+        level=envs.simulation.level,
         seed=seed,
         episodes_per_env=episodes_per_env,
         replays=tuple(replay for one in ended for replay in one),
@@ -155,7 +155,7 @@ def check_recordable(envs: RollerVectorEnv) -> None:
     Raises:
         RunError: they may.
     """
-    config, level = envs.config, envs.simulation.compiled.level
+    config, level = envs.config, envs.simulation.level
     steps = math.ceil(level.time_limit_s / config.control_dt_s)
     try:
         check_length(config, min(steps, config.max_episode_steps or steps))

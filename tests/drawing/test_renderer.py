@@ -67,8 +67,7 @@ def test_the_picture_changes_when_the_ball_rolls(game: Filmed) -> None:
 def test_one_sees_the_ball_turn_on_the_spot(game: Filmed) -> None:
     before = game.picture()
     snapshot = game.simulation.snapshot()
-    orientation = 1 + game.simulation.compiled.ball_qpos + 3
-    snapshot.physics[:, orientation : orientation + 4] = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
+    snapshot.bodies.orientation[:] = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)
     game.simulation.restore(snapshot)
     turned = game.picture()
     assert differing(before, turned) > 30

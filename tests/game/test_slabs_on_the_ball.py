@@ -51,8 +51,7 @@ def let_down(
     """
     game = Game(level, num_envs=len(places), physics=physics)
     snapshot = game.simulation.snapshot()
-    begin = 1 + game.simulation.compiled.ball_qpos
-    snapshot.physics[:, begin : begin + 3] = places
+    snapshot.bodies.position[:] = places
     game.simulation.restore(snapshot)
     game.state.signals[:] = True
     deepest = np.full(len(places), -np.inf)
@@ -67,7 +66,7 @@ def depths(game: Game, level: Level) -> Float64:
     """Return how deep every ball is inside the gate, (N,) metres; below zero it is outside."""
     gate = level.gates[0]
     ball = game.simulation.ball_position
-    slab = game.simulation.qpos[:, game.simulation.compiled.gate_qpos[0]]
+    slab = game.simulation.gate_displacement[:, 0]
     yaw = np.radians(gate.yaw_deg)
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
     local = ball - np.array(gate.at)

@@ -220,7 +220,7 @@ def _game() -> tuple[Plugins, Asked]:
         return Status(
             phase=frame.phase,
             episode=frame.episode,
-            ball_x=float(frame.after[frame.ball]),
+            ball_x=float(frame.after[0]),
             pushed=frame.phase is Phase.PLAYING and bool(np.any(force)),
             coins=frame.result.coins,
             success=frame.result.success,

@@ -104,7 +104,7 @@ def test_another_level_waits_at_the_start_panel_and_begins_at_once_from_a_game(
     table.viewer.get_sim_events()
     table.viewer.send_to_sim(WishEvent(Wish(Command.CHOOSE_LEVEL, "other")))
     frame = table.look().frame
-    assert frame.level is table.sessions["other"].compiled.level
+    assert frame.level is table.sessions["other"].level
     assert frame.phase is after
     (scene,) = (e for e in table.viewer.get_sim_events() if isinstance(e, SceneEvent))
     assert scene.choice == "other"

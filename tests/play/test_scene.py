@@ -49,7 +49,7 @@ class Shown:
 
 def shown(level: Level) -> Shown:
     game = Game(level)
-    scene = PlayScene(game.simulation.compiled.level, PRESET)
+    scene = PlayScene(game.simulation.level, PRESET)
     result = Shown(scene, mujoco.MjData(scene.model), game.simulation)
     result.show()
     return result
@@ -82,7 +82,7 @@ def test_what_is_seen_lies_and_turns_as_on_the_games_own_stage(name: str) -> Non
 
 
 def test_its_positions_are_those_of_the_simulation(hall: Shown) -> None:
-    assert hall.scene.model.nq == hall.simulation.compiled.model.nq
+    assert hall.scene.model.nq == hall.simulation.qpos.shape[1]
     assert (hall.data.qpos == hall.simulation.qpos[0]).all()
 
 

@@ -201,9 +201,7 @@ def test_a_game_that_was_put_elsewhere_is_no_game_of_the_level() -> None:
     with pytest.raises(ValueError, match=r"found \[1\] begun with a moving ball or without coins"):
         Recorder(simulation).begin([0, 1])
     snapshot = simulation.snapshot(np.array([0]))
-    # MuJoCo's state is time, positions and then velocities.
-    velocity = 1 + simulation.compiled.model.nq + simulation.compiled.ball_qvel
-    snapshot.physics[0, velocity] = 1.0
+    snapshot.bodies.velocity[0, 0] = 1.0
     simulation.restore(snapshot)
     assert simulation.ball_velocity[0].tolist() == [1.0, 0.0, 0.0]
     with pytest.raises(ValueError, match=r"found \[0\] begun with a moving ball"):

@@ -65,9 +65,7 @@ def plain_data(model: mujoco.MjModel, state: Float64) -> mujoco.MjData:
 
 def force_on_ball(simulation: Simulation) -> list[float]:
     """Return the newtons, x, y and z, with which the motors pushed the first ball."""
-    compiled = simulation.compiled
-    data = plain_data(compiled.model, simulation.snapshot().physics[0])
-    force: list[float] = data.ctrl[compiled.force_ctrl].tolist()
+    force: list[float] = simulation.snapshot().bodies.force_n[0].tolist()
     return force
 
 

@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from roller_env.compile.compiled import compile_level
 from roller_env.level import shipped_levels
 from tests.simulation.driving import (
     along_the_route,
@@ -22,7 +23,7 @@ def test_a_step_is_a_loop_of_mj_step_bit_for_bit(level: str, physics: str) -> No
     simulation = simulation_of(
         level, num_envs=3, physics=physics, reward="shaped", control_dt_s=1 / 20, num_threads=2
     )
-    model, substeps = simulation.compiled.model, simulation.config.substeps
+    model, substeps = compile_level(simulation.level, physics).model, simulation.config.substeps
     copies = [plain_data(model, state) for state in simulation.snapshot().physics]
     wander = wandering(num_envs=3)
     state = np.empty(mujoco.mj_stateSize(model, STATE))

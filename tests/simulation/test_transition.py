@@ -30,11 +30,8 @@ def rolling(speed: float, **pieces: Any) -> Simulation:
     """Return a game on wide ground with the ball at the origin rolling towards +x."""
     simulation = simulation_of(make_level(**pieces), reward_weights=WEIGHTS)
     snapshot = simulation.snapshot()
-    compiled = simulation.compiled
-    # MuJoCo's integration state begins with time, qpos and qvel.
-    velocity = 1 + compiled.model.nq + compiled.ball_qvel
-    snapshot.physics[0, velocity] = speed
-    snapshot.physics[0, velocity + 4] = speed / compiled.level.ball.radius
+    snapshot.bodies.velocity[0, 0] = speed
+    snapshot.bodies.angular_velocity[0, 1] = speed / simulation.level.ball.radius
     simulation.restore(snapshot)
     return simulation
 
@@ -93,14 +90,13 @@ def test_a_pad_pushes_from_the_step_after_the_one_in_which_it_was_entered() -> N
 
 def test_a_plate_sinks_from_the_step_after_the_one_in_which_it_was_struck() -> None:
     simulation = simulation_of("gate", reward="shaped")
-    plate = simulation.compiled.plate_qpos
     while not simulation.state.of(PLATE).struck.any():
         simulation.step(along_the_route(simulation))
     assert observed(simulation, "plate_sinking")[0] == 1.0
     assert observed(simulation, "plate_present")[0] == 0.0
-    rested = simulation.qpos[0, plate]
+    rested = simulation.plate_displacement[0]
     simulation.step(along_the_route(simulation))
-    sunk = rested - simulation.qpos[0, plate]
+    sunk = rested - simulation.plate_displacement[0]
     assert 0.0 < sunk < 1.1 * 0.0406 * simulation.duration_s
 
 
@@ -113,7 +109,7 @@ def test_falling_terminates_and_is_paid_once() -> None:
         rewards.append(transition.reward[0])
         if transition.terminated[0]:
             break
-        assert simulation.ball_position[0, 2] > simulation.compiled.level.kill_height
+        assert simulation.ball_position[0, 2] > simulation.level.kill_height
     results = simulation.results(np.array([0]))
     assert transition.terminated[0]
     assert not transition.truncated[0]

@@ -24,6 +24,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
+from roller_env.compile.compiled import compile_level
 from roller_env.config import make_config
 from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.envs.single import RollerEnv
@@ -164,7 +165,8 @@ class PhysicsAlone(Case):
         self._leader, self._actions = leader, random_actions(count)
         self._env = RollerVectorEnv(count, autoreset_mode=AutoresetMode.DISABLED, **options)
         self._env.reset(seed=SEED)
-        self.model: mujoco.MjModel = self._env.simulation.compiled.model
+        games = self._env.simulation
+        self.model: mujoco.MjModel = compile_level(games.level, games.preset).model
         self.substeps = self._env.config.substeps
         # The parts of a state row lie in the order of their bits.
         before = int(STATE) & (int(mujoco.mjtState.mjSTATE_CTRL) - 1)

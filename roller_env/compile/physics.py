@@ -1,0 +1,62 @@
+"""MuJoCo as the engine of a level's games."""
+
+from __future__ import annotations
+
+from roller_env.arrays import Bool, Float64, Int64
+from roller_env.compile.compiled import CompiledLevel
+from roller_env.physics.protocol import Columns
+from roller_env.physics.stepper import Stepper
+
+
+class MujocoPhysics:
+    """N worlds of a compiled level; see `roller_env.physics.protocol.Physics`."""
+
+    def __init__(self, compiled: CompiledLevel, num_envs: int, substeps: int, num_threads: int):
+        """Make the worlds; the arguments are those of `Stepper`."""
+        self.substeps = substeps
+        self._ball = compiled.ball_body
+        self._stepper = Stepper(compiled.model, num_envs, substeps, num_threads)
+        self.state = self._stepper.state
+        self.columns = self._columns(compiled)
+
+    def _columns(self, compiled: CompiledLevel) -> Columns:
+        """Return where things are in MuJoCo's integration state.
+
+        It numbers joints and actuators in the order in which the level's spec adds them: the
+        ball's, then those of the slabs.
+        """
+        first = self._stepper.first_columns
+        position = first["qpos"] + compiled.ball_qpos
+        velocity = first["qvel"] + compiled.ball_qvel
+        return Columns(
+            position=position,
+            orientation=position + 3,
+            velocity=velocity,
+            angular_velocity=velocity + 3,
+            displacement=position + 7,
+            aim=first["act"],
+            force_n=first["ctrl"],
+            pull=first["ctrl"] + 3,
+            movers=self._stepper.act.shape[1],
+            path=compiled.ball_qpos,
+        )
+
+    def reset(self, worlds: Int64) -> None:
+        """Put worlds back to where the level begins, and forget their warnings."""
+        self._stepper.reset(worlds)
+
+    def advance(self, worlds: Int64 | None) -> Float64:
+        """Advance worlds (all, if None); the path is of ``qpos``."""
+        return self._stepper.advance(worlds)
+
+    def advance_late(self, worlds: Int64 | None, still: Int64) -> Float64:
+        """Advance worlds, each after it has stood still for a while."""
+        return self._stepper.advance_late(worlds, still)
+
+    def diverged(self) -> Bool:
+        """Say which worlds, (N,), MuJoCo has warned of."""
+        return self._stepper.diverged()
+
+    def rays(self, origins: Float64, directions: Float64, worlds: Int64 | None) -> Float64:
+        """Return the distances, (n, rays) metres, to the first geom that is not the ball."""
+        return self._stepper.rays(origins, directions, self._ball, worlds)

@@ -1,0 +1,84 @@
+"""What the rules ask of an engine, whichever it is."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+from roller_env.arrays import Bool, Float64, Int64
+
+
+class Columns(NamedTuple):
+    """Where things begin in a row of an engine's state.
+
+    Attributes:
+        position: ball's centre, 3: metres, world frame.
+        orientation: 4: unit quaternion (w, x, y, z), ball to world.
+        velocity: 3: m/s, world frame.
+        angular_velocity: 3: rad/s, in the ball's own frame.
+        displacement: one a slab: how far it is from where it began, metres, <= 0.
+        aim: one a slab: displacement to which it is being pulled, which it may trail.
+        force_n: 3, a control: mean force on the ball over the step, newtons, world frame.
+        pull: one a slab, a control: m/s at which its aim moves; below zero is down.
+        movers: number of slabs.
+        path: where the ball's centre begins in a row of the path that a step leaves.
+    """
+
+    position: int
+    orientation: int
+    velocity: int
+    angular_velocity: int
+    displacement: int
+    aim: int
+    force_n: int
+    pull: int
+    movers: int
+    path: int
+
+
+class Physics(Protocol):
+    """N worlds of one level: balls, and slabs that go down.
+
+    Worlds are named by sorted numbers without repetition. What one does depends neither on how many
+    there are nor on the number of threads, bit for bit.
+
+    Attributes:
+        state: (N, width) float64, C-contiguous, live: all that a world's future depends on. What is
+            written there counts from the next step on.
+        columns: where everything is in it.
+        substeps: steps of `advance`, S, between which a path is kept.
+    """
+
+    state: Float64
+    columns: Columns
+    substeps: int
+
+    def reset(self, worlds: Int64) -> None:
+        """Put worlds back to where the level begins, at rest."""
+
+    def advance(self, worlds: Int64 | None) -> Float64:
+        """Advance worlds (all, if None) by a control step, and return where they went.
+
+        Returns:
+            (n, S + 1, p) before the first step and after each, metres, world frame; overwritten by
+            the next call.
+        """
+
+    def advance_late(self, worlds: Int64 | None, still: Int64) -> Float64:
+        """Advance worlds as `advance` does, each after it has stood still for a while.
+
+        Args:
+            worlds: which; None for all.
+            still: (n,) steps at the beginning, 0 to S, in which each does not move.
+        """
+
+    def diverged(self) -> Bool:
+        """Say which worlds, (N,), the engine has given up on since their last `reset`."""
+
+    def rays(self, origins: Float64, directions: Float64, worlds: Int64 | None) -> Float64:
+        """Return the distances, (n, rays) metres, to the first solid along each ray; else ``inf``.
+
+        Args:
+            origins: (n, rays, 3) metres, world frame.
+            directions: (rays, 3) unit vectors, world frame.
+            worlds: which; None for all.
+        """
