@@ -178,7 +178,7 @@ def test_a_spec_says_all_of_an_environment_and_no_more() -> None:
         assert replace(recovered.config, level="flat", physics="default") == replace(
             config, level="flat", physics="default"
         )
-        assert recovered.simulation.compiled.level == load_level(config.level)
+        assert recovered.simulation.level == load_level(config.level)
         assert recovered.simulation.compiled.preset == physics_preset(config.physics)
 
 
