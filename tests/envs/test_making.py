@@ -23,7 +23,7 @@ from roller_env.physics.presets import PhysicsPreset
 
 
 def level_of(env: Any) -> str:
-    return str(env.unwrapped.simulation.compiled.level.name)
+    return str(env.unwrapped.simulation.level.name)
 
 
 def test_there_is_an_id_for_every_shipped_level_and_one_for_any() -> None:

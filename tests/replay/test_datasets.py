@@ -179,7 +179,7 @@ def test_a_spec_says_all_of_an_environment_and_no_more() -> None:
             config, level="flat", physics="default"
         )
         assert recovered.simulation.level == load_level(config.level)
-        assert recovered.simulation.compiled.preset == physics_preset(config.physics)
+        assert recovered.simulation.preset == physics_preset(config.physics)
 
 
 def test_minari_recovers_an_environment_whose_options_are_objects() -> None:
