@@ -38,6 +38,22 @@ def turn(quaternion: Any, start: Vector, stop: Vector, time: float) -> None:
 
 
 @kernel
+def turned(quaternion: Any, v: Vector) -> Vector:
+    """Return a vector of the ball's frame in the world's."""
+    axis = (quaternion[1], quaternion[2], quaternion[3])
+    twice = scaled(2.0, cross(axis, v))
+    return add(plus(v, quaternion[0], twice), cross(axis, twice))
+
+
+@kernel
+def turned_back(quaternion: Any, v: Vector) -> Vector:
+    """Return a vector of the world's frame in the ball's."""
+    axis = (-quaternion[1], -quaternion[2], -quaternion[3])
+    twice = scaled(2.0, cross(axis, v))
+    return add(plus(v, quaternion[0], twice), cross(axis, twice))
+
+
+@kernel
 def _rotation_vector(start: Vector, stop: Vector, time: float) -> Vector:
     """Return the rotation vector of a step, to the sixth power of its length.
 

@@ -1,0 +1,349 @@
+"""The motion of balls among solids, from event to event.
+
+A segment is the motion between two events under one set of held contacts. In order:
+
+1. **near**: the solids that the ball can reach, and those it touches;
+2. **weld**: what touches twice counts once, inner edges do not count at all;
+3. **impact**: whatever approaches is stopped or thrown back, all contacts at once;
+4. **holding**: which contacts press, stick and slip, and the accelerations that follow;
+5. **motion**: a parabola, a skid that turns (both exact), or a step of RK4 around edges and corners
+   and for slips that turn at several contacts, no longer than the cap;
+6. **events**: the first of the end of the step, the end of a slip, a contact that lets go, a
+   feature that ends, and the next impact.
+
+A ball needs nothing of the others, so any split of the rows over threads gives the same bits.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.physics.rigid.attitude import turn, turned, turned_back
+from roller_env.physics.rigid.events import features_end, next_impact
+from roller_env.physics.rigid.holding import (
+    CURVE,
+    PARABOLA,
+    SKID,
+    STEP,
+    Motion,
+    choose_motion,
+    end_slip,
+    slips_end,
+    slowing,
+)
+from roller_env.physics.rigid.impact import collide, keep_closed, settle
+from roller_env.physics.rigid.impact_time import CONTACT_GAP_M
+from roller_env.physics.rigid.kernels import (
+    Ball,
+    Record,
+    Records,
+    Twist,
+    Vector,
+    kernel,
+    norm,
+    plus,
+    position_at,
+    put,
+    row,
+    scaled,
+    sub,
+    vector,
+)
+from roller_env.physics.rigid.motion import (
+    arc_end,
+    back_to_surface,
+    curve_until,
+    runge_kutta,
+    skid,
+    skid_end,
+)
+from roller_env.physics.rigid.near import gather, look_ahead, reach, touch, weld
+from roller_env.physics.rigid.scene import MARGIN_M, Scenes
+from roller_env.physics.rigid.slabs import move_slabs, set_going, time_to_stop
+from roller_env.physics.rigid.states import Commands, Counts, States
+from roller_env.physics.rigid.workspace import Workspace
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+
+MOST_SEGMENTS: Final = 200
+"""In one control step; beyond it the ball is moved on by force, and that is counted."""
+
+FORCED_STEP_S: Final = 1e-3
+
+MANY_SEGMENTS: Final = 32
+"""In one control step; beyond it contacts change faster than is worth following (a ball that spins
+in a corner chatters against its walls), and several at once are stepped over."""
+
+SHORTEST_S: Final = 1e-13
+
+
+class Course(NamedTuple):
+    """The way of a ball until the next event, as a parabola from where it is."""
+
+    until: float  # duration, seconds
+    limit: float  # the same, if it meets nothing
+    acceleration: Vector  # of the parabola
+    there: Ball  # the ball at the limit, of motions that are no parabolas
+
+
+@kernel
+def advance(
+    scenes: Scenes,
+    level_of_row: Int64,
+    states: States,
+    commands: Commands,
+    rows: Int64,
+    duration: float,
+    cap: float,
+    path: Float64,
+    counts: Counts,
+    workspace: Workspace,
+    thread: int,
+) -> None:
+    """Move the balls of some rows by a control step.
+
+    Args:
+        scenes: what they meet.
+        level_of_row: (N,) which level each ball is in.
+        states: where they are; changed in place.
+        commands: what is done to them.
+        rows: (n,) which of them to move.
+        duration: of the control step, seconds.
+        cap: longest step of RK4, seconds.
+        path: (N, S + 1, 3) receives the centres at the start and after each S-th of the step.
+        counts: counted up.
+        workspace: made for the scenes.
+        thread: which of its memories to use; no other thread may use it meanwhile.
+    """
+    work = workspace.work[thread]
+    for place in range(len(rows)):
+        number = rows[place]
+        level_number = level_of_row[number]
+        level = scenes.level[level_number]
+        slabs = workspace.slab[thread, : level.slabs]
+        set_going(scenes, level_number, states, commands, number, slabs)
+        force = row(commands.force, number)
+        pull = (
+            force[0] / level.mass,
+            force[1] / level.mass,
+            force[2] / level.mass - level.gravity,
+        )
+        orientation = states.orientation[number]
+        spin = turned(orientation, row(states.spin, number))
+        ball = Ball(row(states.position, number), row(states.velocity, number), spin)
+        work.segments = work.forced = work.unsolved = work.blocked = 0
+        delay = min(commands.delay[number], duration)
+        ball = _advance_ball(
+            scenes, level, slabs, work, ball, orientation, pull, delay, duration, cap, path[number]
+        )
+        put(states.position, number, ball.position)
+        put(states.velocity, number, ball.velocity)
+        put(states.spin, number, turned_back(orientation, ball.spin))
+        for k in range(len(slabs)):
+            states.slab[number, k] = slabs[k].shift
+        counts.segments[number] += work.segments
+        counts.forced[number] += work.forced
+        counts.unsolved[number] += work.unsolved
+        counts.blocked[number] += work.blocked
+
+
+@kernel
+def _advance_ball(
+    scenes: Scenes,
+    level: Record,
+    slabs: Records,
+    work: Record,
+    ball: Ball,
+    orientation: Any,
+    pull: Vector,
+    delay: float,
+    duration: float,
+    cap: float,
+    path: Any,
+) -> Ball:
+    """Return a ball after a control step; turn its orientation, in place."""
+    radius, solids = level.radius, scenes.solid
+    put(path, 0, ball.position)
+    still = Course(delay, delay, (0.0, 0.0, 0.0), ball)
+    sampled = _sample(
+        path, 1, Ball(ball.position, (0.0, 0.0, 0.0), ball.spin), still, 0.0, duration
+    )
+    time = delay
+    centre, listed = ball.position, -1.0  # what is listed as near is so around this place
+    while time < duration:
+        work.segments += 1
+        left = min(look_ahead(ball, pull, duration - time), time_to_stop(slabs))
+        way = reach(ball, pull, left)
+        if norm(sub(ball.position, centre)) + way > listed:
+            centre = ball.position
+            listed = min(reach(ball, pull, duration - time), MARGIN_M) + CONTACT_GAP_M
+            gather(scenes, level, slabs, work, centre, listed, duration - time)
+        count = touch(solids, slabs, work, radius, ball.position)
+        if count > 0:
+            count, ball = _meet(work, slabs, solids, count, radius, ball)
+        twist = Twist(ball.velocity, ball.spin)
+        many = work.segments > MANY_SEGMENTS
+        motion = choose_motion(work, count, radius, twist, pull, 0.25 * cap, many)
+        if not motion.solved:
+            work.unsolved += 1
+        course = _plan(work, solids, motion, radius, ball, pull, left, cap)
+        course = _until(work, solids, motion, radius, ball, pull, way, course)
+        if work.segments > MOST_SEGMENTS:
+            until = max(course.until, min(duration - time, FORCED_STEP_S))
+            course = Course(until, course.limit, course.acceleration, course.there)
+            work.forced += 1
+        sampled = _sample(path, sampled, ball, course, time, duration)
+        after = _move(work, solids, motion, radius, ball, pull, course)
+        turn(orientation, ball.spin, after.spin, course.until)
+        ball = after
+        move_slabs(slabs, course.until)
+        time += course.until
+        if duration - time < SHORTEST_S:
+            time = duration
+    while sampled < len(path):
+        put(path, sampled, ball.position)
+        sampled += 1
+    return ball
+
+
+@kernel
+def _sample(
+    path: Any, sampled: int, ball: Ball, course: Course, time: float, duration: float
+) -> int:
+    """Write where the ball is on its course at the next S-ths of the step; return which is next."""
+    samples = len(path) - 1
+    end = (time + course.until) * samples * (1.0 + 1e-15)
+    while sampled <= samples and sampled * duration <= end:
+        at = sampled * duration / samples - time
+        put(path, sampled, position_at(ball.position, ball.velocity, course.acceleration, at))
+        sampled += 1
+    return sampled
+
+
+@kernel
+def _meet(
+    work: Record, slabs: Records, solids: Records, count: int, radius: float, ball: Ball
+) -> tuple[int, Ball]:
+    """Return how many contacts stay closed, and the ball after their impacts.
+
+    It is moved by less than a contact's gap, to half of that away from each contact.
+    """
+    count = weld(work, count, radius)
+    p = ball.position
+    for i in range(count):
+        contact = work.contact[i]
+        p = plus(p, 0.5 * CONTACT_GAP_M - contact.gap, vector(contact.normal))
+    twist = Twist(ball.velocity, ball.spin)
+    twist, solved, blocked = collide(work, slabs, solids, count, radius, twist)
+    if not solved:
+        work.unsolved += 1
+    if blocked > 0:
+        work.blocked += blocked
+        for place in range(work.found):
+            slab = solids[work.near[place].solid].slab
+            if slab >= 0:
+                work.near[place].rise = slabs[slab].speed
+    count = keep_closed(work, count, twist.linear)
+    twist = settle(work, count, radius, twist)
+    return count, Ball(p, twist.linear, twist.angular)
+
+
+@kernel
+def _plan(
+    work: Record,
+    solids: Records,
+    motion: Motion,
+    radius: float,
+    ball: Ball,
+    pull: Vector,
+    left: float,
+    cap: float,
+) -> Course:
+    """Return the course of a ball that meets nothing."""
+    holding, twist = motion.holding, Twist(ball.velocity, ball.spin)
+    if motion.kind == PARABOLA:
+        limit = left
+        if holding > 0:
+            limit = min(left, slips_end(work, holding, radius, twist, motion.rates))
+        return Course(limit, limit, motion.rates.linear, ball)
+    if motion.kind == STEP:
+        limit = min(left, 0.25 * cap)
+        return Course(limit, limit, motion.rates.linear, ball)
+    limit = min(left, cap, arc_end(work, holding, radius, ball.velocity))
+    if motion.kind == SKID:
+        contact = work.contact[0]
+        limit = min(limit, skid_end(contact, radius, ball, pull))
+        there = skid(contact, radius, ball, pull, limit)
+    else:
+        limit = min(limit, max(0.5 * slowing(work, holding, radius, twist), cap / 64.0))
+        limit, there = curve_until(work, solids, holding, radius, ball, pull, limit)
+    return Course(limit, limit, _through(ball, there.position, limit), there)
+
+
+@kernel
+def _through(ball: Ball, there: Vector, time: float) -> Vector:
+    """Return the acceleration of the parabola that leads a ball to a place in ``time``."""
+    missed = sub(there, plus(ball.position, time, ball.velocity))
+    return scaled(2.0 / (time * time), missed)
+
+
+@kernel
+def _until(
+    work: Record,
+    solids: Records,
+    motion: Motion,
+    radius: float,
+    ball: Ball,
+    pull: Vector,
+    way: float,
+    course: Course,
+) -> Course:
+    """Return a course that ends where the ball leaves a feature or meets a solid."""
+    p, v, a = ball.position, ball.velocity, course.acceleration
+    until = course.until
+    if motion.kind != CURVE:
+        until = min(until, features_end(work, solids, motion.holding, p, v, a))
+    until = next_impact(work, solids, motion.holding, radius, p, v, a, way, until)
+    if motion.kind == CURVE and 0.0 < until < course.limit:
+        # A parabola through both ends of a curve is off between them: end it here.
+        there = runge_kutta(work, motion.holding, radius, ball, pull, until)
+        course = Course(until, until, _through(ball, there.position, until), there)
+        a = course.acceleration
+        until = next_impact(work, solids, motion.holding, radius, p, v, a, way, until)
+    return Course(until, course.limit, course.acceleration, course.there)
+
+
+@kernel
+def _move(
+    work: Record,
+    solids: Records,
+    motion: Motion,
+    radius: float,
+    ball: Ball,
+    pull: Vector,
+    course: Course,
+) -> Ball:
+    """Return the ball at the end of its course."""
+    time, holding = course.until, motion.holding
+    after = course.there
+    if motion.kind == PARABOLA or motion.kind == STEP:
+        after = Ball(
+            position_at(ball.position, ball.velocity, motion.rates.linear, time),
+            plus(ball.velocity, time, motion.rates.linear),
+            plus(ball.spin, time, motion.rates.angular),
+        )
+    elif time != course.limit:
+        if motion.kind == CURVE:
+            after = runge_kutta(work, holding, radius, ball, pull, time)
+        else:
+            after = skid(work.contact[0], radius, ball, pull, time)
+    p, twist = after.position, Twist(after.velocity, after.spin)
+    if motion.kind == CURVE or motion.kind == STEP:
+        p = back_to_surface(work, solids, holding, radius, p, time)
+    if time == course.limit:
+        twist = end_slip(work, holding, radius, twist)
+    return Ball(p, twist.linear, twist.angular)
