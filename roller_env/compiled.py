@@ -38,9 +38,11 @@ def compiled_with_package(function: Callable[_P, _R]) -> Callable[_P, _R]:
     """Return ``function`` compiled as `compiled` does, to run without Python's lock.
 
     It may use functions and constants of all modules in its own directory: what was kept of it is
-    compiled anew when any of them has changed.
+    compiled anew when any of them has changed. It makes no arrays, so that none has to be counted:
+    counting the references to arguments, an atomic operation each, cost as much as the work.
     """
-    dispatcher = _dispatcher(function, nogil=True)
+    # Numba has no public name for the switch of its counting runtime; see `numba.core.options`.
+    dispatcher = _dispatcher(function, nogil=True, _nrt=False)
     file = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if file is not None:
         # Of the function's own file, as Numba has it; it has no name for a stamp of several.
@@ -48,13 +50,13 @@ def compiled_with_package(function: Callable[_P, _R]) -> Callable[_P, _R]:
     return cast("Callable[_P, _R]", dispatcher)
 
 
-def _dispatcher(function: Callable[..., Any], *, nogil: bool = False) -> Any:
+def _dispatcher(function: Callable[..., Any], **options: bool) -> Any:
     try:
-        return numba.njit(cache=True, nogil=nogil, error_model="numpy")(function)
+        return numba.njit(cache=True, error_model="numpy", **options)(function)
     except RuntimeError:
         # Nowhere to write: neither beside the package nor in the user's cache directory.
         _WAIT.kept = False
-        return numba.njit(nogil=nogil, error_model="numpy")(function)
+        return numba.njit(error_model="numpy", **options)(function)
 
 
 @cache

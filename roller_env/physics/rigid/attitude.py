@@ -11,10 +11,24 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from roller_env.physics.rigid.kernels import Vector, add, cross, kernel, norm, plus, scaled, sub
+from roller_env.physics.rigid.kernels import (
+    Vector,
+    add,
+    cross,
+    dot,
+    kernel,
+    norm,
+    plus,
+    scaled,
+    sub,
+)
 
 LARGEST_TURN: Final = 0.1
 """Radians by which the angular velocity may swing its axis in one step of the series."""
+
+
+_SERIES: Final = 0.25
+"""Square of half an angle of rotation, rad^2, up to which series are cheaper than functions."""
 
 
 @kernel
@@ -29,6 +43,9 @@ def turn(quaternion: Any, start: Vector, stop: Vector, time: float) -> None:
     """
     change = sub(stop, start)
     swing = norm(cross(start, stop)) * time * time
+    if swing <= LARGEST_TURN * LARGEST_TURN:
+        _rotate(quaternion, _rotation_vector(start, stop, time))
+        return
     steps = 1 + int(math.sqrt(swing) / LARGEST_TURN)
     step = time / steps
     for index in range(steps):
@@ -71,19 +88,27 @@ def _rotation_vector(start: Vector, stop: Vector, time: float) -> Vector:
 @kernel
 def _rotate(quaternion: Any, rotation: Vector) -> None:
     """Multiply a quaternion from the left by that of a rotation vector, in place."""
-    half = 0.5 * norm(rotation)
-    if half < 1e-4:
-        square = half * half
-        sine = 0.5 * (1.0 - square / 6.0 * (1.0 - square / 20.0))
+    square = 0.25 * dot(rotation, rotation)
+    if square < _SERIES:
+        # Taylor's series of sin(x)/x and cos(x), to rounding.
+        sine = 1.0 - square / 210.0 * (1.0 - square / 272.0)
+        sine = 1.0 - square / 110.0 * (1.0 - square / 156.0 * sine)
+        sine = 1.0 - square / 42.0 * (1.0 - square / 72.0 * sine)
+        sine = 0.5 * (1.0 - square / 6.0 * (1.0 - square / 20.0 * sine))
+        c = 1.0 - square / 182.0 * (1.0 - square / 240.0)
+        c = 1.0 - square / 90.0 * (1.0 - square / 132.0 * c)
+        c = 1.0 - square / 30.0 * (1.0 - square / 56.0 * c)
+        c = 1.0 - square / 2.0 * (1.0 - square / 12.0 * c)
     else:
-        sine = 0.5 * math.sin(half) / half
-    c = math.cos(half)
+        half = math.sqrt(square)
+        sine, c = 0.5 * math.sin(half) / half, math.cos(half)
     x, y, z = sine * rotation[0], sine * rotation[1], sine * rotation[2]
     q0, q1, q2, q3 = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     w = c * q0 - x * q1 - y * q2 - z * q3
     i = c * q1 + x * q0 + y * q3 - z * q2
     j = c * q2 + y * q0 + z * q1 - x * q3
     k = c * q3 + z * q0 + x * q2 - y * q1
-    length = math.sqrt(w * w + i * i + j * j + k * k)
-    quaternion[0], quaternion[1] = w / length, i / length
-    quaternion[2], quaternion[3] = j / length, k / length
+    # One step of Newton's iteration for 1 / |q|, which is 1 but for rounding.
+    unit = 1.5 - 0.5 * (w * w + i * i + j * j + k * k)
+    quaternion[0], quaternion[1] = unit * w, unit * i
+    quaternion[2], quaternion[3] = unit * j, unit * k

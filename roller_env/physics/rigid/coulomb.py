@@ -108,11 +108,9 @@ def solve(work: Record, count: int, radius: float, free: Twist) -> tuple[Twist, 
         radius: of the ball.
         free: velocities without the contacts.
     """
-    for i in range(count):
-        contact = work.contact[i]
-        contact.push = 0.0
-        store(contact.drag, (0.0, 0.0, 0.0))
     if count == 1:
+        work.contact[0].push = 0.0
+        store(work.contact[0].drag, (0.0, 0.0, 0.0))
         twist, _ = _sweep(work, count, radius, free)
         return twist, True
     if count == 2:
@@ -120,17 +118,26 @@ def solve(work: Record, count: int, radius: float, free: Twist) -> tuple[Twist, 
         if stick:
             work.contact[0].status, work.contact[1].status = STICKS, STICKS
             return twist, True
-        for i in range(count):
-            contact = work.contact[i]
-            contact.push = 0.0
-            store(contact.drag, (0.0, 0.0, 0.0))
-    return _iterate(work, count, radius, free)
+    scale = _scale(work, count, radius, free)
+    for i in range(count):
+        contact = work.contact[i]
+        contact.status = SLIPS if contact.slides else STICKS
+    twist = hold(work, count, radius, free)
+    kept = _kept(work, count, radius, twist, scale)
+    if kept and _satisfied(work, count, twist.linear, scale):
+        return twist, True
+    for i in range(count):
+        contact = work.contact[i]
+        contact.push = 0.0
+        store(contact.drag, (0.0, 0.0, 0.0))
+    return _iterate(work, count, radius, free, scale)
 
 
 @kernel
-def _iterate(work: Record, count: int, radius: float, free: Twist) -> tuple[Twist, bool]:
+def _iterate(
+    work: Record, count: int, radius: float, free: Twist, scale: float
+) -> tuple[Twist, bool]:
     """Return what `solve` does, by sweeps over the contacts and Newton's method."""
-    scale = _scale(work, count, radius, free)
     twist = free
     sweeps = _FIRST_SWEEPS
     for _ in range(_MOST_ATTEMPTS):
@@ -240,8 +247,8 @@ def _both_stick(work: Record, radius: float, free: Twist) -> tuple[bool, bool, T
         inside = (
             na >= 0.0
             and nb >= 0.0
-            and math.hypot(along_a, t) <= mu_a * na + room
-            and math.hypot(along_b, shared - t) <= mu_b * nb + room
+            and _length(along_a, t) <= mu_a * na + room
+            and _length(along_b, shared - t) <= mu_b * nb + room
         )
         if inside and (not found or abs(t - 0.5 * shared) < abs(best - 0.5 * shared)):
             best, found = t, True
@@ -251,6 +258,11 @@ def _both_stick(work: Record, radius: float, free: Twist) -> tuple[bool, bool, T
     store(first.drag, plus(scaled(along_a, d), best, cross(d, a)))
     store(second.drag, plus(scaled(along_b, d), shared - best, cross(d, b)))
     return True, possible and found, after
+
+
+@kernel
+def _length(x: float, y: float) -> float:
+    return math.sqrt(x * x + y * y)
 
 
 @kernel
@@ -295,14 +307,75 @@ def hold(work: Record, count: int, radius: float, free: Twist) -> Twist:
         defined, _, twist = _both_stick(work, radius, free)
         if defined:
             return twist
+    return _hold_several(work, count, radius, free)
+
+
+@kernel
+def _hold_several(work: Record, count: int, radius: float, free: Twist) -> Twist:
+    """Return what `hold` does, from a system of linear equations.
+
+    Its unknowns are the impulse of a contact that sticks, three numbers, and the normal part of one
+    that slips; its equations that the velocity of the one's point, and the normal velocity of the
+    other, are what they should be.
+    """
+    size = 0
     for i in range(count):
         contact = work.contact[i]
-        contact.push = 0.0
-        store(contact.drag, (0.0, 0.0, 0.0))
-        work.active[i] = i
-    _respond(work, count)
-    _newton_step(work, count, radius, free, True)
-    return _sum(work, count, radius, free)
+        contact.first = size
+        size += _unknowns(contact)
+    for i in range(count):
+        _write_equations(work, count, size, work.contact[i], radius, free)
+    eliminate(work.system, size, work.columns)
+    twist = free
+    for i in range(count):
+        contact = work.contact[i]
+        impulse = (0.0, 0.0, 0.0)
+        for b in range(_unknowns(contact)):
+            impulse = plus(impulse, work.system[contact.first + b, size], _unit_impulse(contact, b))
+        n = vector(contact.normal)
+        contact.push = dot(n, impulse)
+        store(contact.drag, tangential(impulse, n))
+        twist = _apply(contact, radius, twist, contact.push, vector(contact.drag))
+    return twist
+
+
+@kernel
+def _write_equations(
+    work: Record, count: int, size: int, contact: Record, radius: float, free: Twist
+) -> None:
+    """Write the rows of a contact into the system of ``size`` unknowns."""
+    system, place, n = work.system, contact.first, vector(contact.normal)
+    if contact.status == STICKS:
+        wanted = plus(vector(contact.surface), contact.bias, n)
+        moving = plus(free.linear, radius, cross(n, free.angular))
+        for a in range(3):
+            system[place + a, size] = wanted[a] - moving[a]
+    else:
+        system[place, size] = -excess(contact, free.linear)
+    for j in range(count):
+        other = work.contact[j]
+        for b in range(_unknowns(other)):
+            impulse = _unit_impulse(other, b)
+            if contact.status == STICKS:
+                turned = cross(vector(other.normal), impulse)
+                effect = plus(impulse, -_SPIN_PER_IMPULSE, cross(n, turned))
+                for a in range(3):
+                    system[place + a, other.first + b] = effect[a]
+            else:
+                system[place, other.first + b] = dot(n, impulse)
+
+
+@kernel
+def _unknowns(contact: Record) -> int:
+    return 3 if contact.status == STICKS else 1
+
+
+@kernel
+def _unit_impulse(contact: Record, b: int) -> Vector:
+    """Return an axis of the world for a contact that sticks, and that of the cone for others."""
+    if contact.status == STICKS:
+        return 1.0 if b == 0 else 0.0, 1.0 if b == 1 else 0.0, 1.0 if b == 2 else 0.0
+    return plus(vector(contact.normal), -contact.friction, vector(contact.direction))
 
 
 @kernel
@@ -327,7 +400,7 @@ def _polish(
     for _ in range(_MOST_NEWTON_STEPS):
         if m == 0:
             break
-        residual = _newton_step(work, m, radius, free, False)
+        residual = _newton_step(work, m, radius, free)
         if residual <= _ROUNDING * scale or (residual <= 1e-12 * scale and residual >= before):
             done = True
             break
@@ -340,6 +413,19 @@ def _polish(
         contact.push = contact.kept_push
         store(contact.drag, vector(contact.kept_drag))
     return False, twist
+
+
+@kernel
+def _kept(work: Record, count: int, radius: float, twist: Twist, scale: float) -> bool:
+    """Say whether contacts stay closed, and those that stick do: nothing rigid may give way."""
+    room = 1e-12 * scale
+    for i in range(count):
+        contact = work.contact[i]
+        if abs(excess(contact, twist.linear)) > room:
+            return False
+        if contact.status == STICKS and norm(slip(contact, radius, twist)) > room:
+            return False
+    return True
 
 
 @kernel
@@ -402,7 +488,7 @@ def _respond(work: Record, m: int) -> None:
 
 
 @kernel
-def _newton_step(work: Record, m: int, radius: float, free: Twist, known: bool) -> float:
+def _newton_step(work: Record, m: int, radius: float, free: Twist) -> float:
     """Change the impulses of the ``m`` active contacts by one Newton step; return the residual.
 
     Args:
@@ -410,7 +496,6 @@ def _newton_step(work: Record, m: int, radius: float, free: Twist, known: bool) 
         m: how many are active.
         radius: of the ball.
         free: velocities without contacts.
-        known: the direction of every slip is known, so that the step is exact.
     """
     twist = free
     for i in range(m):
@@ -438,9 +523,9 @@ def _newton_step(work: Record, m: int, radius: float, free: Twist, known: bool) 
             system[3 * i + 2, size] = -u2
             continue
         mu, push, drag = contact.friction, contact.push, vector(contact.drag)
-        speed = math.hypot(u1, u2)
+        speed = _length(u1, u2)
         stiffness = 0.0
-        if known or contact.slides:
+        if contact.slides:
             d = vector(contact.direction)
             d1, d2 = dot(d, first), dot(d, second)
         elif speed > 0.0:

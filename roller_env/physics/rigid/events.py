@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
-from roller_env.physics.rigid.closest import FACE, extent, from_centre, time_on_feature
+from roller_env.physics.rigid.closest import (
+    FACE,
+    extent,
+    feature_margin,
+    from_centre,
+    time_on_feature,
+)
 from roller_env.physics.rigid.impact import velocity_over
 from roller_env.physics.rigid.impact_time import CONTACT_GAP_M, impact_time
 from roller_env.physics.rigid.kernels import (
@@ -22,17 +26,42 @@ from roller_env.physics.rigid.near import WELD_M
 
 @kernel
 def features_end(
-    work: Record, solids: Records, count: int, p: Vector, v: Vector, a: Vector
+    work: Record,
+    solids: Records,
+    count: int,
+    p: Vector,
+    v: Vector,
+    a: Vector,
+    way: float,
+    until: float,
 ) -> float:
-    """Return when the ball first leaves a feature that holds it."""
-    end = math.inf
+    """Return when, before ``until``, the ball leaves a feature that holds it, or ``until``."""
     for i in range(count):
         contact = work.contact[i]
         solid = solids[contact.solid]
         relative = from_centre(solid, contact.shift, p)
-        velocity = velocity_over(contact, v)
-        end = min(end, time_on_feature(solid, contact.kind, contact.axis, relative, velocity, a))
-    return end
+        margin = feature_margin(solid, contact.kind, contact.axis, relative)
+        if margin <= way + abs(contact.rise) * until:
+            velocity = velocity_over(contact, v)
+            end = time_on_feature(solid, contact.kind, contact.axis, relative, velocity, a)
+            until = min(until, end)
+    return until
+
+
+@kernel
+def goes_alone(work: Record, solids: Records, p: Vector, way: float, until: float) -> bool:
+    """Say whether a ball on one face, of the first contact, meets nothing and stays on it."""
+    contact = work.contact[0]
+    solid = solids[contact.solid]
+    relative = from_centre(solid, contact.shift, p)
+    margin = feature_margin(solid, contact.kind, contact.axis, relative)
+    if margin <= way + abs(contact.rise) * until:
+        return False
+    for place in range(work.found):
+        near = work.near[place]
+        if near.solid != contact.solid and near.gap <= way + abs(near.rise) * until:
+            return False
+    return True
 
 
 @kernel
@@ -63,6 +92,8 @@ def next_impact(
     for place in range(work.found):
         near = work.near[place]
         if near.gap > way + abs(near.rise) * until + CONTACT_GAP_M:
+            continue
+        if count > 0 and work.contact[0].solid == near.solid:
             continue
         solid = solids[near.solid]
         n = vector(near.normal)

@@ -65,7 +65,7 @@ def _skid_setting(
     along = scaled(1.0 / push, g)
     aside = cross(n, along)
     x, y = dot(u, along), dot(u, aside)
-    size = math.hypot(x, y)
+    size = math.sqrt(x * x + y * y)
     k = 3.5 * contact.friction * -dot(pull, n)
     return along, aside, speed, push, x / size, y / size, k
 
@@ -147,6 +147,16 @@ def runge_kutta(
 def _sum(a: Vector, b: Vector, c: Vector, d: Vector) -> Vector:
     """Return ``a + 2 b + 2 c + d``."""
     return add(add(a, d), scaled(2.0, add(b, c)))
+
+
+@kernel
+def hermite(ball: Ball, after: Ball, duration: float, time: float) -> Vector:
+    """Return a place on the cubic through two states, ``time`` after the first."""
+    x = time / duration
+    way = sub(after.position, plus(ball.position, duration, ball.velocity))
+    bent = scaled(duration, sub(after.velocity, ball.velocity))
+    p = plus(ball.position, time, ball.velocity)
+    return plus(plus(p, x * x * (3.0 - 2.0 * x), way), x * x * (x - 1.0), bent)
 
 
 @kernel

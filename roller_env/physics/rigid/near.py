@@ -8,13 +8,11 @@ from typing import Final
 from roller_env.physics.rigid.closest import EDGE, FACE, closest, from_centre
 from roller_env.physics.rigid.impact_time import CONTACT_GAP_M
 from roller_env.physics.rigid.kernels import (
-    Ball,
     Record,
     Records,
     Vector,
     dot,
     kernel,
-    norm,
     plus,
     row,
     store,
@@ -28,25 +26,23 @@ WELD_M: Final = 100.0 * CONTACT_GAP_M
 
 
 @kernel
-def reach(ball: Ball, pull: Vector, time: float) -> float:
-    """Return a bound of the ball's way in ``time``: contacts only take away from it."""
-    return norm(ball.velocity) * time + norm(pull) * time * time
+def look_ahead(speed: float, pull: float, left: float) -> float:
+    """Return for how long, at most ``left``, the ball stays within the grid's margin.
+
+    Contacts only take away from the way ``speed t + pull t^2`` that a free ball can go.
+    """
+    if speed * left + pull * left * left > MARGIN_M:
+        left = min(left, 0.5 * MARGIN_M / (speed + 1e-9))
+        if speed * left + pull * left * left > MARGIN_M:
+            left = min(left, 0.7 * math.sqrt(0.5 * MARGIN_M / pull))
+    return left
 
 
 @kernel
-def look_ahead(ball: Ball, pull: Vector, left: float) -> float:
-    """Return for how long the ball stays within the grid's margin.
-
-    Args:
-        ball: as it is now.
-        pull: acceleration without contacts, m/s^2.
-        left: at most, seconds.
-    """
-    fastest, force = norm(ball.velocity), norm(pull)
-    if fastest * left + force * left * left > MARGIN_M:
-        left = min(left, 0.5 * MARGIN_M / (fastest + 1e-9))
-        if fastest * left + force * left * left > MARGIN_M:
-            left = min(left, 0.7 * math.sqrt(0.5 * MARGIN_M / force))
+def time_within(way: float, speed: float, acceleration: float, left: float) -> float:
+    """Return for how long, at most ``left``, a ball goes no further than ``way``."""
+    if speed * left + 0.5 * acceleration * left * left > way:
+        left = 2.0 * way / (speed + math.sqrt(speed * speed + 2.0 * acceleration * way))
     return left
 
 

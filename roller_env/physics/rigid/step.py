@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.physics.rigid.attitude import turn, turned, turned_back
-from roller_env.physics.rigid.events import features_end, next_impact
+from roller_env.physics.rigid.events import features_end, goes_alone, next_impact
 from roller_env.physics.rigid.holding import (
     CURVE,
     PARABOLA,
@@ -56,11 +56,12 @@ from roller_env.physics.rigid.motion import (
     arc_end,
     back_to_surface,
     curve_until,
+    hermite,
     runge_kutta,
     skid,
     skid_end,
 )
-from roller_env.physics.rigid.near import gather, look_ahead, reach, touch, weld
+from roller_env.physics.rigid.near import gather, look_ahead, time_within, touch, weld
 from roller_env.physics.rigid.scene import MARGIN_M, Scenes
 from roller_env.physics.rigid.slabs import move_slabs, set_going, time_to_stop
 from roller_env.physics.rigid.states import Commands, Counts, States
@@ -80,6 +81,8 @@ in a corner chatters against its walls), and several at once are stepped over.""
 
 SHORTEST_S: Final = 1e-13
 
+_MOST_REFINEMENTS: Final = 4
+
 
 class Course(NamedTuple):
     """The way of a ball until the next event, as a parabola from where it is."""
@@ -88,6 +91,7 @@ class Course(NamedTuple):
     limit: float  # the same, if it meets nothing
     acceleration: Vector  # of the parabola
     there: Ball  # the ball at the limit, of motions that are no parabolas
+    alone: int  # 1 if the ball is known to meet nothing, and to leave nothing
 
 
 @kernel
@@ -168,20 +172,22 @@ def _advance_ball(
     """Return a ball after a control step; turn its orientation, in place."""
     radius, solids = level.radius, scenes.solid
     put(path, 0, ball.position)
-    still = Course(delay, delay, (0.0, 0.0, 0.0), ball)
-    sampled = _sample(
-        path, 1, Ball(ball.position, (0.0, 0.0, 0.0), ball.spin), still, 0.0, duration
-    )
+    sampled = 1
+    while sampled < len(path) and sampled * duration <= delay * (len(path) - 1):
+        put(path, sampled, ball.position)
+        sampled += 1
     time = delay
     centre, listed = ball.position, -1.0  # what is listed as near is so around this place
+    force = norm(pull)
     while time < duration:
         work.segments += 1
-        left = min(look_ahead(ball, pull, duration - time), time_to_stop(slabs))
-        way = reach(ball, pull, left)
+        speed, rest = norm(ball.velocity), duration - time
+        left = min(look_ahead(speed, force, rest), time_to_stop(slabs))
+        way = speed * left + force * left * left
         if norm(sub(ball.position, centre)) + way > listed:
             centre = ball.position
-            listed = min(reach(ball, pull, duration - time), MARGIN_M) + CONTACT_GAP_M
-            gather(scenes, level, slabs, work, centre, listed, duration - time)
+            listed = min(speed * rest + force * rest * rest, MARGIN_M) + CONTACT_GAP_M
+            gather(scenes, level, slabs, work, centre, listed, rest)
         count = touch(solids, slabs, work, radius, ball.position)
         if count > 0:
             count, ball = _meet(work, slabs, solids, count, radius, ball)
@@ -190,14 +196,15 @@ def _advance_ball(
         motion = choose_motion(work, count, radius, twist, pull, 0.25 * cap, many)
         if not motion.solved:
             work.unsolved += 1
-        course = _plan(work, solids, motion, radius, ball, pull, left, cap)
+        course = _plan(work, solids, motion, radius, ball, pull, way, left, cap)
         course = _until(work, solids, motion, radius, ball, pull, way, course)
         if work.segments > MOST_SEGMENTS:
-            until = max(course.until, min(duration - time, FORCED_STEP_S))
-            course = Course(until, course.limit, course.acceleration, course.there)
+            course = _at(course, max(course.until, min(rest, FORCED_STEP_S)))
             work.forced += 1
-        sampled = _sample(path, sampled, ball, course, time, duration)
         after = _move(work, solids, motion, radius, ball, pull, course)
+        sampled = _sample(
+            work, motion.kind, radius, ball, after, pull, course, path, sampled, time, duration
+        )
         turn(orientation, ball.spin, after.spin, course.until)
         ball = after
         move_slabs(slabs, course.until)
@@ -212,16 +219,45 @@ def _advance_ball(
 
 @kernel
 def _sample(
-    path: Any, sampled: int, ball: Ball, course: Course, time: float, duration: float
+    work: Record,
+    kind: int,
+    radius: float,
+    ball: Ball,
+    after: Ball,
+    pull: Vector,
+    course: Course,
+    path: Any,
+    sampled: int,
+    time: float,
+    duration: float,
 ) -> int:
-    """Write where the ball is on its course at the next S-ths of the step; return which is next."""
-    samples = len(path) - 1
-    end = (time + course.until) * samples * (1.0 + 1e-15)
-    while sampled <= samples and sampled * duration <= end:
-        at = sampled * duration / samples - time
-        put(path, sampled, position_at(ball.position, ball.velocity, course.acceleration, at))
+    """Write where a ball is on its course at the next S-ths of the step; return which is next."""
+    piece = duration / (len(path) - 1)
+    end = (time + course.until) * (1.0 + 1e-15)
+    while sampled < len(path) and sampled * piece <= end:
+        at = sampled * piece - time
+        put(path, sampled, _between(work, kind, radius, ball, after, pull, course, at))
         sampled += 1
     return sampled
+
+
+@kernel
+def _between(
+    work: Record,
+    kind: int,
+    radius: float,
+    ball: Ball,
+    after: Ball,
+    pull: Vector,
+    course: Course,
+    time: float,
+) -> Vector:
+    """Return where a ball is ``time`` after it set out on a course that ends at ``after``."""
+    if kind == SKID:
+        return skid(work.contact[0], radius, ball, pull, time).position
+    if kind == CURVE:
+        return hermite(ball, after, course.until, time)
+    return position_at(ball.position, ball.velocity, course.acceleration, time)
 
 
 @kernel
@@ -260,28 +296,41 @@ def _plan(
     radius: float,
     ball: Ball,
     pull: Vector,
+    way: float,
     left: float,
     cap: float,
 ) -> Course:
-    """Return the course of a ball that meets nothing."""
+    """Return the course of a ball that meets nothing, no further than ``way``."""
     holding, twist = motion.holding, Twist(ball.velocity, ball.spin)
+    # Spin and wedges can drive a ball faster than forces alone.
+    changes = 1.0 if motion.kind == PARABOLA or motion.kind == STEP else 2.0
+    left = time_within(way, norm(ball.velocity), changes * norm(motion.rates.linear), left)
     if motion.kind == PARABOLA:
         limit = left
         if holding > 0:
             limit = min(left, slips_end(work, holding, radius, twist, motion.rates))
-        return Course(limit, limit, motion.rates.linear, ball)
+        return Course(limit, limit, motion.rates.linear, ball, 0)
     if motion.kind == STEP:
         limit = min(left, 0.25 * cap)
-        return Course(limit, limit, motion.rates.linear, ball)
-    limit = min(left, cap, arc_end(work, holding, radius, ball.velocity))
+        return Course(limit, limit, motion.rates.linear, ball, 0)
     if motion.kind == SKID:
         contact = work.contact[0]
-        limit = min(limit, skid_end(contact, radius, ball, pull))
+        limit = min(left, skid_end(contact, radius, ball, pull))
+        if goes_alone(work, solids, ball.position, way, limit):
+            return Course(limit, limit, pull, skid(contact, radius, ball, pull, limit), 1)
+        limit = min(limit, cap)
         there = skid(contact, radius, ball, pull, limit)
     else:
+        limit = min(left, cap, arc_end(work, holding, radius, ball.velocity))
         limit = min(limit, max(0.5 * slowing(work, holding, radius, twist), cap / 64.0))
         limit, there = curve_until(work, solids, holding, radius, ball, pull, limit)
-    return Course(limit, limit, _through(ball, there.position, limit), there)
+    return Course(limit, limit, _through(ball, there.position, limit), there, 0)
+
+
+@kernel
+def _at(course: Course, until: float) -> Course:
+    """Return a course that ends at another time."""
+    return Course(until, course.limit, course.acceleration, course.there, course.alone)
 
 
 @kernel
@@ -303,18 +352,24 @@ def _until(
     course: Course,
 ) -> Course:
     """Return a course that ends where the ball leaves a feature or meets a solid."""
-    p, v, a = ball.position, ball.velocity, course.acceleration
-    until = course.until
-    if motion.kind != CURVE:
-        until = min(until, features_end(work, solids, motion.holding, p, v, a))
-    until = next_impact(work, solids, motion.holding, radius, p, v, a, way, until)
-    if motion.kind == CURVE and 0.0 < until < course.limit:
-        # A parabola through both ends of a curve is off between them: end it here.
-        there = runge_kutta(work, motion.holding, radius, ball, pull, until)
-        course = Course(until, until, _through(ball, there.position, until), there)
-        a = course.acceleration
-        until = next_impact(work, solids, motion.holding, radius, p, v, a, way, until)
-    return Course(until, course.limit, course.acceleration, course.there)
+    if course.alone:
+        return course
+    p, v, holding = ball.position, ball.velocity, motion.holding
+    for _ in range(_MOST_REFINEMENTS):
+        a, until = course.acceleration, course.until
+        if motion.kind != CURVE:
+            until = features_end(work, solids, holding, p, v, a, way, until)
+        until = next_impact(work, solids, holding, radius, p, v, a, way, until)
+        exact = motion.kind == PARABOLA or motion.kind == STEP
+        if exact or until >= course.until or until <= 0.0:
+            break
+        # A parabola through both ends of a curve is off between them: end it here, and look again.
+        if motion.kind == CURVE:
+            there = runge_kutta(work, holding, radius, ball, pull, until)
+        else:
+            there = skid(work.contact[0], radius, ball, pull, until)
+        course = Course(until, until, _through(ball, there.position, until), there, 0)
+    return _at(course, until)
 
 
 @kernel

@@ -34,6 +34,7 @@ CONTACT: Final = np.dtype(
         ("status", np.int64),  # `OPEN`, `STICKS` or `SLIPS`
         ("push", np.float64),  # N
         ("drag", np.float64, 3),  # T
+        ("first", np.int64),  # place of its unknowns in `system`
         ("kept_push", np.float64),
         ("kept_drag", np.float64, 3),
     ],
