@@ -119,18 +119,52 @@ def solve(work: Record, count: int, radius: float, free: Twist) -> tuple[Twist, 
             work.contact[0].status, work.contact[1].status = STICKS, STICKS
             return twist, True
     scale = _scale(work, count, radius, free)
-    for i in range(count):
-        contact = work.contact[i]
-        contact.status = SLIPS if contact.slides else STICKS
-    twist = hold(work, count, radius, free)
-    kept = _kept(work, count, radius, twist, scale)
-    if kept and _satisfied(work, count, twist.linear, scale):
+    done, twist = _enumerate(work, count, radius, free, scale)
+    if done:
         return twist, True
     for i in range(count):
         contact = work.contact[i]
         contact.push = 0.0
         store(contact.drag, (0.0, 0.0, 0.0))
     return _iterate(work, count, radius, free, scale)
+
+
+@kernel
+def _enumerate(
+    work: Record, count: int, radius: float, free: Twist, scale: float
+) -> tuple[bool, Twist]:
+    """Return whether guesses of what every contact does lead to an answer, and the velocities.
+
+    First all press, and stick if they do not slip already; then those that would pull open, one
+    after the other; then those that would leave their cone begin to slip.
+    """
+    for i in range(count):
+        contact = work.contact[i]
+        contact.status = SLIPS if contact.slides else STICKS
+    twist = free
+    for _ in range(count):
+        twist = _hold_several(work, count, radius, free)
+        kept = _kept(work, count, radius, twist, scale)
+        if kept and _satisfied(work, count, twist.linear, scale):
+            return True, twist
+        most, pulls = 0.0, -1
+        for i in range(count):
+            if work.contact[i].push < most:
+                most, pulls = work.contact[i].push, i
+        if pulls < 0:
+            break
+        work.contact[pulls].status = OPEN
+    begins = False
+    for i in range(count):
+        contact = work.contact[i]
+        drag, most = vector(contact.drag), contact.friction * contact.push
+        if contact.status == STICKS and norm(drag) > most:
+            contact.status = SLIPS
+            store(contact.drag, scaled(max(most, 0.0) / norm(drag), drag))
+            begins = True
+    if begins:
+        return _polish(work, count, radius, free, scale)
+    return False, twist
 
 
 @kernel
@@ -312,7 +346,7 @@ def hold(work: Record, count: int, radius: float, free: Twist) -> Twist:
 
 @kernel
 def _hold_several(work: Record, count: int, radius: float, free: Twist) -> Twist:
-    """Return what `hold` does, from a system of linear equations.
+    """Return what `hold` does, from a system of linear equations; `OPEN` contacts do nothing.
 
     Its unknowns are the impulse of a contact that sticks, three numbers, and the normal part of one
     that slips; its equations that the velocity of the one's point, and the normal velocity of the
@@ -345,6 +379,8 @@ def _write_equations(
 ) -> None:
     """Write the rows of a contact into the system of ``size`` unknowns."""
     system, place, n = work.system, contact.first, vector(contact.normal)
+    if contact.status == OPEN:
+        return
     if contact.status == STICKS:
         wanted = plus(vector(contact.surface), contact.bias, n)
         moving = plus(free.linear, radius, cross(n, free.angular))
@@ -367,6 +403,8 @@ def _write_equations(
 
 @kernel
 def _unknowns(contact: Record) -> int:
+    if contact.status == OPEN:
+        return 0
     return 3 if contact.status == STICKS else 1
 
 
@@ -421,7 +459,7 @@ def _kept(work: Record, count: int, radius: float, twist: Twist, scale: float) -
     room = 1e-12 * scale
     for i in range(count):
         contact = work.contact[i]
-        if abs(excess(contact, twist.linear)) > room:
+        if contact.status != OPEN and abs(excess(contact, twist.linear)) > room:
             return False
         if contact.status == STICKS and norm(slip(contact, radius, twist)) > room:
             return False

@@ -66,7 +66,10 @@ def slide(
     Returns:
         The slip along the push and at right angles to it, m/s; the way along both, metres.
     """
-    c2, s2 = 0.5 * (1.0 + cos_angle), 0.5 * (1.0 - cos_angle)
+    # Of the two squares the smaller would drown in rounding.
+    more = 0.5 * (1.0 + abs(cos_angle))
+    less = 0.25 * sin_angle * sin_angle / more
+    c2, s2 = (more, less) if cos_angle > 0.0 else (less, more)
     two_cs = sin_angle
     x = _parameter(slip, push, c2, s2, k, time)
     along = slip * (c2 * math.exp((push - k) * x) - s2 * math.exp(-(push + k) * x))
@@ -85,8 +88,10 @@ def slide(
 def _parameter(slip: float, push: float, c2: float, s2: float, k: float, time: float) -> float:
     """Return X at ``time``: Newton's iteration, held between bounds that close in on it."""
     low, high = 0.0, math.inf
-    # The slip shrinks at least at the rate k - g and at most at k + g.
     x = time / slip
+    if push > k and c2 > 0.0:
+        # The part of the slip that grows would alone take this long.
+        x = min(x, math.log1p((push - k) * time / (slip * c2)) / (push - k))
     for _ in range(_MOST_ITERATIONS):
         slow, fast = _integral(k - push, x), _integral(k + push, x)
         excess = slip * (c2 * slow + s2 * fast) - time
