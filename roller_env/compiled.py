@@ -41,8 +41,21 @@ def compiled_with_package(function: Callable[_P, _R]) -> Callable[_P, _R]:
     compiled anew when any of them has changed. It makes no arrays, so that none has to be counted:
     counting the references to arguments, an atomic operation each, cost as much as the work.
     """
+    return _with_package(function, inline=False)
+
+
+def inlined_with_package(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Return ``function`` compiled as `compiled_with_package` does, into whatever calls it.
+
+    For what has one caller, and arguments that cost more to pass than it takes to work on them: an
+    array is seven numbers.
+    """
+    return _with_package(function, inline=True)
+
+
+def _with_package(function: Callable[_P, _R], *, inline: bool) -> Callable[_P, _R]:
     # Numba has no public name for the switch of its counting runtime; see `numba.core.options`.
-    dispatcher = _dispatcher(function, nogil=True, _nrt=False)
+    dispatcher = _dispatcher(function, nogil=True, _nrt=False, forceinline=inline)
     file = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if file is not None:
         # Of the function's own file, as Numba has it; it has no name for a stamp of several.
@@ -61,8 +74,8 @@ def _dispatcher(function: Callable[..., Any], **options: bool) -> Any:
 
 @cache
 def _stamp(directory: Path) -> tuple[tuple[str, float, int], ...]:
-    """Return what changes when a module of a directory does."""
-    files = sorted(directory.glob("*.py"))
+    """Return what changes when a module of a directory does, or how it is compiled."""
+    files = [Path(__file__), *sorted(directory.glob("*.py"))]
     states = [(file.name, file.stat()) for file in files]
     return tuple((name, state.st_mtime, state.st_size) for name, state in states)
 

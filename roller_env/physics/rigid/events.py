@@ -17,6 +17,7 @@ from roller_env.physics.rigid.kernels import (
     Vector,
     dot,
     first_root,
+    inlined,
     kernel,
     sub,
     vector,
@@ -24,7 +25,7 @@ from roller_env.physics.rigid.kernels import (
 from roller_env.physics.rigid.near import WELD_M
 
 
-@kernel
+@inlined
 def features_end(
     work: Record,
     solids: Records,
@@ -48,7 +49,7 @@ def features_end(
     return until
 
 
-@kernel
+@inlined
 def goes_alone(work: Record, solids: Records, p: Vector, way: float, until: float) -> bool:
     """Say whether a ball on one face, of the first contact, meets nothing and stays on it."""
     contact = work.contact[0]
@@ -64,7 +65,7 @@ def goes_alone(work: Record, solids: Records, p: Vector, way: float, until: floa
     return True
 
 
-@kernel
+@inlined
 def next_impact(
     work: Record,
     solids: Records,

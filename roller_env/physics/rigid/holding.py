@@ -15,6 +15,7 @@ from roller_env.physics.rigid.kernels import (
     Vector,
     cross,
     dot,
+    inlined,
     kernel,
     norm,
     plus,
@@ -91,7 +92,7 @@ def lay_out(work: Record, count: int, radius: float, ball: Ball, time: float) ->
         bend(contact, radius, Twist(ball.velocity, ball.spin))
 
 
-@kernel
+@inlined
 def choose_motion(
     work: Record,
     count: int,

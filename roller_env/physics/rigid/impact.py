@@ -12,6 +12,7 @@ from roller_env.physics.rigid.kernels import (
     Vector,
     cross,
     dot,
+    inlined,
     kernel,
     norm,
     plus,
@@ -61,7 +62,7 @@ def closed_m_s(count: int) -> float:
     return CLOSED_M_S if count == 1 else CHATTER_M_S
 
 
-@kernel
+@inlined
 def collide(
     work: Record, slabs: Records, solids: Records, count: int, radius: float, twist: Twist
 ) -> tuple[Twist, bool, int]:
@@ -99,7 +100,7 @@ def collide(
     return after, solved, blocked
 
 
-@kernel
+@inlined
 def keep_closed(work: Record, count: int, v: Vector) -> int:
     """Leave out contacts that open; return how many are left."""
     fastest = closed_m_s(count)
@@ -113,7 +114,7 @@ def keep_closed(work: Record, count: int, v: Vector) -> int:
     return count
 
 
-@kernel
+@inlined
 def settle(work: Record, count: int, radius: float, twist: Twist) -> Twist:
     """Return the velocities without what rounding left of closed contacts and ended slips."""
     v, w = twist

@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.compiled import compiled_with_package as kernel
+from roller_env.compiled import inlined_with_package as inlined
 
-__all__ = ["kernel"]
+__all__ = ["inlined", "kernel"]
 
 Vector = tuple[float, float, float]
 

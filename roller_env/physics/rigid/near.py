@@ -12,6 +12,7 @@ from roller_env.physics.rigid.kernels import (
     Records,
     Vector,
     dot,
+    inlined,
     kernel,
     plus,
     row,
@@ -25,7 +26,7 @@ WELD_M: Final = 100.0 * CONTACT_GAP_M
 """What lies this near to a plane lies in it."""
 
 
-@kernel
+@inlined
 def look_ahead(speed: float, pull: float, left: float) -> float:
     """Return for how long, at most ``left``, the ball stays within the grid's margin.
 
@@ -38,7 +39,7 @@ def look_ahead(speed: float, pull: float, left: float) -> float:
     return left
 
 
-@kernel
+@inlined
 def time_within(way: float, speed: float, acceleration: float, left: float) -> float:
     """Return for how long, at most ``left``, a ball goes no further than ``way``."""
     if speed * left + 0.5 * acceleration * left * left > way:
@@ -46,7 +47,7 @@ def time_within(way: float, speed: float, acceleration: float, left: float) -> f
     return left
 
 
-@kernel
+@inlined
 def gather(
     scenes: Scenes,
     level: Record,
@@ -97,7 +98,7 @@ def gather(
     work.found = found
 
 
-@kernel
+@inlined
 def touch(solids: Records, slabs: Records, work: Record, radius: float, position: Vector) -> int:
     """Measure the distances of all that is near, and list the contacts; return how many."""
     count = 0

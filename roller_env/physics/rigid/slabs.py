@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from roller_env.physics.rigid.kernels import Records, kernel
+from roller_env.physics.rigid.kernels import Records, inlined
 from roller_env.physics.rigid.scene import Scenes
 from roller_env.physics.rigid.states import Commands, States
 
 
-@kernel
+@inlined
 def set_going(
     scenes: Scenes, level: int, states: States, commands: Commands, row: int, slabs: Records
 ) -> None:
@@ -22,7 +22,7 @@ def set_going(
         slab.speed = 0.0 if ended else speed
 
 
-@kernel
+@inlined
 def time_to_stop(slabs: Records) -> float:
     """Return when the first slab is at an end of its way; ``inf`` if none moves."""
     time = math.inf
@@ -36,7 +36,7 @@ def time_to_stop(slabs: Records) -> float:
     return time
 
 
-@kernel
+@inlined
 def move_slabs(slabs: Records, time: float) -> None:
     """Let the slabs move for ``time``; those at an end of their way stop there."""
     for k in range(len(slabs)):

@@ -42,6 +42,7 @@ from roller_env.physics.rigid.kernels import (
     Records,
     Twist,
     Vector,
+    inlined,
     kernel,
     norm,
     plus,
@@ -155,7 +156,7 @@ def advance(
         counts.blocked[number] += work.blocked
 
 
-@kernel
+@inlined
 def _advance_ball(
     scenes: Scenes,
     level: Record,
@@ -217,7 +218,7 @@ def _advance_ball(
     return ball
 
 
-@kernel
+@inlined
 def _sample(
     work: Record,
     kind: int,
@@ -241,7 +242,7 @@ def _sample(
     return sampled
 
 
-@kernel
+@inlined
 def _between(
     work: Record,
     kind: int,
@@ -260,7 +261,7 @@ def _between(
     return position_at(ball.position, ball.velocity, course.acceleration, time)
 
 
-@kernel
+@inlined
 def _meet(
     work: Record, slabs: Records, solids: Records, count: int, radius: float, ball: Ball
 ) -> tuple[int, Ball]:
@@ -288,7 +289,7 @@ def _meet(
     return count, Ball(p, twist.linear, twist.angular)
 
 
-@kernel
+@inlined
 def _plan(
     work: Record,
     solids: Records,
@@ -340,7 +341,7 @@ def _through(ball: Ball, there: Vector, time: float) -> Vector:
     return scaled(2.0 / (time * time), missed)
 
 
-@kernel
+@inlined
 def _until(
     work: Record,
     solids: Records,
@@ -372,7 +373,7 @@ def _until(
     return _at(course, until)
 
 
-@kernel
+@inlined
 def _move(
     work: Record,
     solids: Records,
