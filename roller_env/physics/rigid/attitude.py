@@ -30,6 +30,16 @@ LARGEST_TURN: Final = 0.1
 _SERIES: Final = 0.25
 """Square of half an angle of rotation, rad^2, up to which series are cheaper than functions."""
 
+_COSINE: Final = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(8))
+_SINE: Final = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(8))
+"""Taylor's series of cos(x) and sin(x)/x in the square of x, to rounding up to `_SERIES`."""
+
+
+@kernel
+def _polynomial(c: tuple[float, ...], x: float) -> float:
+    low = (c[0] + x * c[1]) + x * x * (c[2] + x * c[3])
+    return low + (x * x) * (x * x) * ((c[4] + x * c[5]) + x * x * (c[6] + x * c[7]))
+
 
 @kernel
 def turn(quaternion: Any, start: Vector, stop: Vector, time: float) -> None:
@@ -90,15 +100,7 @@ def _rotate(quaternion: Any, rotation: Vector) -> None:
     """Multiply a quaternion from the left by that of a rotation vector, in place."""
     square = 0.25 * dot(rotation, rotation)
     if square < _SERIES:
-        # Taylor's series of sin(x)/x and cos(x), to rounding.
-        sine = 1.0 - square / 210.0 * (1.0 - square / 272.0)
-        sine = 1.0 - square / 110.0 * (1.0 - square / 156.0 * sine)
-        sine = 1.0 - square / 42.0 * (1.0 - square / 72.0 * sine)
-        sine = 0.5 * (1.0 - square / 6.0 * (1.0 - square / 20.0 * sine))
-        c = 1.0 - square / 182.0 * (1.0 - square / 240.0)
-        c = 1.0 - square / 90.0 * (1.0 - square / 132.0 * c)
-        c = 1.0 - square / 30.0 * (1.0 - square / 56.0 * c)
-        c = 1.0 - square / 2.0 * (1.0 - square / 12.0 * c)
+        sine, c = 0.5 * _polynomial(_SINE, square), _polynomial(_COSINE, square)
     else:
         half = math.sqrt(square)
         sine, c = 0.5 * math.sin(half) / half, math.cos(half)

@@ -59,6 +59,8 @@ _ROUNDING: Final = 1e-14
 _ALIKE: Final = 1e-9
 """Share of the speeds by which those of two points along the line between them may differ."""
 
+_SINGULAR: Final = 1e-11
+
 _ABSURD: Final = 1e6
 """Impulses that grow beyond this, over the speeds there are, have no end: nothing rigid gives."""
 
@@ -143,7 +145,7 @@ def _enumerate(
         contact.status = SLIPS if contact.slides else STICKS
     twist = free
     for _ in range(count):
-        twist = _hold_several(work, count, radius, free)
+        twist = _hold_known(work, count, radius, free)
         kept = _kept(work, count, radius, twist, scale)
         if kept and _satisfied(work, count, twist.linear, scale):
             return True, twist
@@ -337,16 +339,80 @@ def hold(work: Record, count: int, radius: float, free: Twist) -> Twist:
         contact.push = push
         store(contact.drag, drag)
         return _apply(contact, radius, free, push, drag)
-    if count == 2 and work.contact[0].status == STICKS and work.contact[1].status == STICKS:
-        defined, _, twist = _both_stick(work, radius, free)
-        if defined:
+    return _hold_known(work, count, radius, free)
+
+
+@kernel
+def _hold_known(work: Record, count: int, radius: float, free: Twist) -> Twist:
+    """Return what `hold` does, of two contacts or more; `OPEN` ones do nothing."""
+    if count == 2:
+        done, twist = _hold_pair(work, radius, free)
+        if done:
             return twist
     return _hold_several(work, count, radius, free)
 
 
 @kernel
+def _hold_pair(work: Record, radius: float, free: Twist) -> tuple[bool, Twist]:
+    """Return whether two contacts are told from each other, and what `hold` does if so."""
+    a, b = work.contact[0], work.contact[1]
+    if a.status == STICKS and b.status == STICKS:
+        defined, _, twist = _both_stick(work, radius, free)
+        return defined, twist
+    if a.status == STICKS:
+        a, b = b, a
+    if a.status != SLIPS or b.status == OPEN:
+        return False, free
+    n_a, n_b, first = vector(a.normal), vector(b.normal), _unit_impulse(a, 0)
+    opening = excess(a, free.linear)
+    if b.status == SLIPS:
+        second = _unit_impulse(b, 0)
+        ab, ba = dot(n_a, second), dot(n_b, first)
+        rest = 1.0 - ab * ba
+        if abs(rest) < _SINGULAR:
+            return False, free
+        other = excess(b, free.linear)
+        one = (ab * other - opening) / rest
+        impulse = scaled((ba * opening - other) / rest, second)
+    else:
+        # The point of contact of b is to move so, whatever the impulse at a.
+        wanted = plus(vector(b.surface), b.bias, n_b)
+        missed = sub(wanted, plus(free.linear, radius, cross(n_b, free.angular)))
+        alone = _impulse_for(n_b, missed)
+        effect = plus(first, -_SPIN_PER_IMPULSE, cross(n_b, cross(n_a, first)))
+        answer = _impulse_for(n_b, effect)
+        rest = 1.0 - dot(n_a, answer)
+        if abs(rest) < _SINGULAR:
+            return False, free
+        one = (-opening - dot(n_a, alone)) / rest
+        impulse = plus(alone, -one, answer)
+    _take(a, scaled(one, first))
+    _take(b, impulse)
+    twist = _apply(a, radius, free, a.push, vector(a.drag))
+    return True, _apply(b, radius, twist, b.push, vector(b.drag))
+
+
+@kernel
+def _impulse_for(n: Vector, change: Vector) -> Vector:
+    """Return the impulse that alone changes the velocity of its point of contact so."""
+    return plus(
+        scaled(1.0 / _SLIP_PER_IMPULSE, change),
+        _SPIN_PER_IMPULSE / _SLIP_PER_IMPULSE * dot(n, change),
+        n,
+    )
+
+
+@kernel
+def _take(contact: Record, impulse: Vector) -> None:
+    """Write an impulse as a contact's push and drag."""
+    n = vector(contact.normal)
+    contact.push = dot(n, impulse)
+    store(contact.drag, tangential(impulse, n))
+
+
+@kernel
 def _hold_several(work: Record, count: int, radius: float, free: Twist) -> Twist:
-    """Return what `hold` does, from a system of linear equations; `OPEN` contacts do nothing.
+    """Return what `_hold_known` does, from a system of linear equations.
 
     Its unknowns are the impulse of a contact that sticks, three numbers, and the normal part of one
     that slips; its equations that the velocity of the one's point, and the normal velocity of the
@@ -366,9 +432,7 @@ def _hold_several(work: Record, count: int, radius: float, free: Twist) -> Twist
         impulse = (0.0, 0.0, 0.0)
         for b in range(_unknowns(contact)):
             impulse = plus(impulse, work.system[contact.first + b, size], _unit_impulse(contact, b))
-        n = vector(contact.normal)
-        contact.push = dot(n, impulse)
-        store(contact.drag, tangential(impulse, n))
+        _take(contact, impulse)
         twist = _apply(contact, radius, twist, contact.push, vector(contact.drag))
     return twist
 

@@ -71,7 +71,7 @@ def bend(contact: Record, radius: float, twist: Twist) -> None:
     contact.bias = 0.0
     if contact.kind != FACE:
         round_it = across(contact, velocity_over(contact, twist.linear))
-        if norm(round_it) > STRAIGHT:
+        if dot(round_it, round_it) > STRAIGHT * STRAIGHT:
             turning = cross(twist.angular, round_it)
             store(contact.surface, tangential(turning, vector(contact.normal)))
             contact.bias = -dot(round_it, round_it) / radius

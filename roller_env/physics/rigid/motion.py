@@ -39,6 +39,9 @@ from roller_env.physics.rigid.sliding import SLIP_SHARE, slide, stop_time
 LONGEST_ARC: Final = 0.05
 """Radians round an edge or a corner in one step of RK4, whose error is their fifth power."""
 
+_MOST_TRIES: Final = 100
+_MOST_ALIKE: Final = 3
+
 _STILL: Final = (0.0, 0.0, 0.0)
 
 
@@ -211,21 +214,33 @@ def curve_until(
     for i in range(count):
         store(work.contact[i].start, vector(work.contact[i].direction))
     there = runge_kutta(work, count, radius, ball, pull, limit)
-    if _room(work, solids, count, radius, there, pull, limit) < 0.0:
-        low, high = 0.0, limit
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            _directions_as_at_start(work, count)
-            there = runge_kutta(work, count, radius, ball, pull, middle)
-            if _room(work, solids, count, radius, there, pull, middle) < 0.0:
-                high = middle
-            else:
-                low = middle
-            if high - low <= 1e-15 + 1e-13 * high:
-                break
-        limit = high
+    beyond = _room(work, solids, count, radius, there, pull, limit)
     _directions_as_at_start(work, count)
-    return limit, runge_kutta(work, count, radius, ball, pull, limit)
+    if beyond >= 0.0:
+        return limit, there
+    # Regula falsi, where an end that stays counts half (the Illinois method), and halves.
+    low, within = 0.0, max(_room(work, solids, count, radius, ball, pull, 0.0), 0.0)
+    same = 0  # how often in a row the limit (below zero) or the lower end moved
+    for _ in range(_MOST_TRIES):
+        share = within / (within - beyond) if abs(same) < _MOST_ALIKE else 0.5
+        middle = low + share * (limit - low)
+        if not low < middle < limit:
+            middle = 0.5 * (low + limit)
+        if limit - low <= 1e-15 + 1e-13 * limit or not low < middle < limit:
+            break
+        _directions_as_at_start(work, count)
+        halfway = runge_kutta(work, count, radius, ball, pull, middle)
+        room = _room(work, solids, count, radius, halfway, pull, middle)
+        if room < 0.0:
+            limit, beyond, there = middle, room, halfway
+            within = 0.5 * within if same < 0 else within
+            same = min(same, 0) - 1
+        else:
+            low, within = middle, room
+            beyond = 0.5 * beyond if same > 0 else beyond
+            same = max(same, 0) + 1
+    _directions_as_at_start(work, count)
+    return limit, there
 
 
 @kernel
