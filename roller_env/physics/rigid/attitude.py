@@ -27,6 +27,9 @@ LARGEST_TURN: Final = 0.1
 """Radians by which the angular velocity may swing its axis in one step of the series."""
 
 
+MOST_TURNS: Final = 1000.0
+"""Steps of the series at most; what turns faster has no attitude to speak of."""
+
 _SERIES: Final = 0.25
 """Square of half an angle of rotation, rad^2, up to which series are cheaper than functions."""
 
@@ -56,7 +59,7 @@ def turn(quaternion: Any, start: Vector, stop: Vector, time: float) -> None:
     if swing <= LARGEST_TURN * LARGEST_TURN:
         _rotate(quaternion, _rotation_vector(start, stop, time))
         return
-    steps = 1 + int(math.sqrt(swing) / LARGEST_TURN)
+    steps = 1 + int(min(math.sqrt(swing) / LARGEST_TURN, MOST_TURNS))
     step = time / steps
     for index in range(steps):
         before = plus(start, index / steps, change)

@@ -46,6 +46,8 @@ from roller_env.physics.rigid.kernels import (
 )
 from roller_env.physics.rigid.linear import eliminate
 
+EXACT: Final = 1e-9
+
 OPEN: Final = 0
 STICKS: Final = 1
 SLIPS: Final = 2
@@ -56,9 +58,6 @@ _FIRST_SWEEPS: Final = 8
 _MOST_ATTEMPTS: Final = 8
 _MOST_NEWTON_STEPS: Final = 12
 _ROUNDING: Final = 1e-14
-_ALIKE: Final = 1e-9
-"""Share of the speeds by which those of two points along the line between them may differ."""
-
 _SINGULAR: Final = 1e-11
 
 _ABSURD: Final = 1e6
@@ -98,7 +97,7 @@ def _apply(contact: Record, radius: float, twist: Twist, push: float, drag: Vect
 
 
 @kernel
-def solve(work: Record, count: int, radius: float, free: Twist) -> tuple[Twist, bool]:
+def solve(work: Record, count: int, radius: float, free: Twist, alike: float) -> tuple[Twist, bool]:
     """Return the velocities after the contacts' impulses, and whether they are the answer.
 
     Works on rates of any kind: velocities, or accelerations. Writes ``status``, ``push`` and
@@ -109,6 +108,8 @@ def solve(work: Record, count: int, radius: float, free: Twist) -> tuple[Twist, 
         count: how many.
         radius: of the ball.
         free: velocities without the contacts.
+        alike: share of what is asked of two points of contact by which that may differ along the
+            line between them, where both stick: `EXACT`, or more for a step in time.
     """
     if count == 1:
         work.contact[0].push = 0.0
@@ -116,7 +117,7 @@ def solve(work: Record, count: int, radius: float, free: Twist) -> tuple[Twist, 
         twist, _ = _sweep(work, count, radius, free)
         return twist, True
     if count == 2:
-        _, stick, twist = _both_stick(work, radius, free)
+        _, stick, twist = _both_stick(work, radius, free, alike)
         if stick:
             work.contact[0].status, work.contact[1].status = STICKS, STICKS
             return twist, True
@@ -229,13 +230,14 @@ def _sweep(work: Record, count: int, radius: float, twist: Twist) -> tuple[Twist
 
 
 @kernel
-def _both_stick(work: Record, radius: float, free: Twist) -> tuple[bool, bool, Twist]:
+def _both_stick(work: Record, radius: float, free: Twist, alike: float) -> tuple[bool, bool, Twist]:
     """Return whether two contacts can both stick, whether they do, and the velocities if so.
 
     Of a rigid ball both points of contact are then given velocities, along the line through them
     alike. About that line, on which the reactions have no moment, its momentum is kept. What the
     reactions are is known but for one number: the friction with which both contacts can press
-    against each other.
+    against each other. ``alike`` is the share of what is asked of the two points by which it may
+    differ along the line between them.
     """
     first, second = work.contact[0], work.contact[1]
     a, b = vector(first.normal), vector(second.normal)
@@ -249,7 +251,8 @@ def _both_stick(work: Record, radius: float, free: Twist) -> tuple[bool, bool, T
     axis = scaled(1.0 / distance, apart)
     point_a = plus(vector(first.surface), first.bias, a)
     differ = sub(point_a, plus(vector(second.surface), second.bias, b))
-    possible = abs(dot(axis, differ)) <= _ALIKE * (norm(differ) + norm(free.linear))
+    allowed = alike * norm(differ) if first.rise == second.rise else 0.0
+    possible = abs(dot(axis, differ)) <= max(allowed, EXACT * norm(free.linear))
     lever = cross(axis, scaled(radius, a))
     inertia = 0.4 * radius * radius
     tilting = scaled(-1.0 / (radius * distance), cross(axis, differ))
@@ -357,7 +360,7 @@ def _hold_pair(work: Record, radius: float, free: Twist) -> tuple[bool, Twist]:
     """Return whether two contacts are told from each other, and what `hold` does if so."""
     a, b = work.contact[0], work.contact[1]
     if a.status == STICKS and b.status == STICKS:
-        defined, _, twist = _both_stick(work, radius, free)
+        defined, _, twist = _both_stick(work, radius, free, EXACT)
         return defined, twist
     if a.status == STICKS:
         a, b = b, a

@@ -6,8 +6,8 @@ import math
 from typing import Final, NamedTuple
 
 from roller_env.physics.rigid.closest import EDGE, FACE
-from roller_env.physics.rigid.coulomb import SLIPS, solve
-from roller_env.physics.rigid.impact import STICK_M_S, true_slip, velocity_over
+from roller_env.physics.rigid.coulomb import EXACT, SLIPS, solve
+from roller_env.physics.rigid.impact import STICK_M_S, calmed, true_slip, velocity_over
 from roller_env.physics.rigid.kernels import (
     Ball,
     Record,
@@ -33,6 +33,11 @@ STRAIGHT: Final = 1e-6
 TURNING: Final = 1e-9
 """Acceleration (m/s^2) of a slip across its direction below which it goes straight on."""
 
+_ALIKE_IN_STEP: Final = 0.1
+"""As `solve` has it: how edges turn in a step says how their points move only to first order."""
+
+_SHORTEST_STEP_S: Final = 1e-9
+
 # Kinds of motion.
 PARABOLA: Final = 0
 SKID: Final = 1
@@ -47,6 +52,7 @@ class Motion(NamedTuple):
     rates: Twist  # accelerations, now
     holding: int  # contacts that hold the ball; they are the first
     solved: bool
+    step: float  # seconds for which a `STEP` is meant
 
 
 @kernel
@@ -107,7 +113,7 @@ def choose_motion(
     Slips that have a direction may leave no forces that hold (P. Painlevé, 1895; with several
     contacts at any friction). Then an impulse acts without an impact: the velocities after ``step``
     seconds are found instead, with what slips then (J. J. Moreau's time stepping), for which there
-    always is an answer.
+    always is an answer. So are those at the end of a slip that turns, in a step just long enough.
 
     Args:
         work: the contacts.
@@ -120,7 +126,7 @@ def choose_motion(
     """
     still = (0.0, 0.0, 0.0)
     if count == 0:
-        return Motion(PARABOLA, Twist(pull, still), 0, True)
+        return Motion(PARABOLA, Twist(pull, still), 0, True, step)
     for i in range(count):
         contact = work.contact[i]
         bend(contact, radius, twist)
@@ -131,24 +137,30 @@ def choose_motion(
             contact.slides = 1
             store(contact.direction, scaled(1.0 / size, u))
     if not many:
-        rates, solved = solve(work, count, radius, Twist(pull, still))
+        rates, solved = solve(work, count, radius, Twist(pull, still), EXACT)
         if solved:
             holding = _pressing_first(work, count)
             kind = _kind_of_motion(work, holding, radius, twist, rates)
+            ends = slowing(work, holding, radius, twist) if kind == CURVE else math.inf
+            if ends >= 0.25 * step:
+                return Motion(kind, rates, holding, True, step)
             # What slips hardly at all turns its slip faster than steps of RK4 could follow.
-            if kind != CURVE or slowing(work, holding, radius, twist) >= 0.25 * step:
-                return Motion(kind, rates, holding, True)
+            step = max(2.0 * ends, _SHORTEST_STEP_S)
     for i in range(count):
         contact = work.contact[i]
-        store(contact.surface, (0.0, 0.0, contact.rise))
+        turning = vector(contact.surface)
+        store(contact.surface, plus((0.0, 0.0, contact.rise), step, turning))
         contact.bias *= step
         contact.slides = 0
-    after, solved = solve(work, count, radius, Twist(plus(twist.linear, step, pull), twist.angular))
+    free = Twist(plus(twist.linear, step, pull), twist.angular)
+    after, solved = solve(work, count, radius, free, _ALIKE_IN_STEP)
+    if not solved:
+        after = calmed(free, after, radius)
     rates = Twist(
         scaled(1.0 / step, sub(after.linear, twist.linear)),
         scaled(1.0 / step, sub(after.angular, twist.angular)),
     )
-    return Motion(STEP, rates, _pressing_first(work, count), solved)
+    return Motion(STEP, rates, _pressing_first(work, count), solved, step)
 
 
 @kernel
@@ -193,11 +205,11 @@ def _kind_of_motion(work: Record, count: int, radius: float, twist: Twist, rates
             going = across(contact, velocity_over(contact, twist.linear))
             if norm(going) > STRAIGHT or norm(across(contact, rates.linear)) > STRAIGHT:
                 kind = CURVE
-        if contact.slides:
+        if contact.slides and contact.friction > 0.0:
             aside = cross(vector(contact.direction), slip_change(contact, radius, rates))
             if norm(aside) > TURNING and kind == PARABOLA:
                 kind = SKID if count == 1 and contact.kind == FACE else CURVE
-        elif contact.status == SLIPS:
+        elif contact.status == SLIPS and not contact.slides:
             # It begins to slip, against the friction that no longer holds it.
             drag = vector(contact.drag)
             size = norm(drag)

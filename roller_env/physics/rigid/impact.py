@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from roller_env.physics.rigid.coulomb import slip_over, solve
+from roller_env.physics.rigid.coulomb import EXACT, slip_over, solve
 from roller_env.physics.rigid.kernels import (
     Record,
     Records,
@@ -57,6 +57,17 @@ def true_slip(contact: Record, radius: float, twist: Twist) -> Vector:
 
 
 @kernel
+def calmed(before: Twist, after: Twist, radius: float) -> Twist:
+    """Return velocities that are no answer, or none if they would have gained energy."""
+    inertia = 0.4 * radius * radius
+    was = dot(before.linear, before.linear) + inertia * dot(before.angular, before.angular)
+    is_now = dot(after.linear, after.linear) + inertia * dot(after.angular, after.angular)
+    if is_now <= was:
+        return after
+    return Twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+@kernel
 def closed_m_s(count: int) -> float:
     """Return the normal velocity below which one of ``count`` contacts is held."""
     return CLOSED_M_S if count == 1 else CHATTER_M_S
@@ -85,7 +96,7 @@ def collide(
         contact.bias = -contact.elasticity * approach if approach < -REST_M_S else 0.0
         moving = moving or contact.rise != 0.0
         fastest = max(fastest, abs(contact.rise))
-    after, solved = solve(work, count, radius, twist)
+    after, solved = solve(work, count, radius, twist, EXACT)
     blocked = 0
     if moving and (not solved or norm(after.linear) > 4.0 * fastest + 1.0):
         for i in range(count):
@@ -96,7 +107,9 @@ def collide(
                 blocked += 1
             contact.rise, contact.bias = 0.0, 0.0
             store(contact.surface, (0.0, 0.0, 0.0))
-        after, solved = solve(work, count, radius, twist)
+        after, solved = solve(work, count, radius, twist, EXACT)
+    if not solved:
+        after = calmed(twist, after, radius)
     return after, solved, blocked
 
 

@@ -91,7 +91,8 @@ def _parameter(slip: float, push: float, c2: float, s2: float, k: float, time: f
     x = time / slip
     if push > k and c2 > 0.0:
         # The part of the slip that grows would alone take this long.
-        x = min(x, math.log1p((push - k) * time / (slip * c2)) / (push - k))
+        high = math.log1p((push - k) * time / (slip * c2)) / (push - k) * (1.0 + 1e-12)
+        x = min(x, high)
     for _ in range(_MOST_ITERATIONS):
         slow, fast = _integral(k - push, x), _integral(k + push, x)
         excess = slip * (c2 * slow + s2 * fast) - time

@@ -312,7 +312,7 @@ def _plan(
             limit = min(left, slips_end(work, holding, radius, twist, motion.rates))
         return Course(limit, limit, motion.rates.linear, ball, 0)
     if motion.kind == STEP:
-        limit = min(left, 0.25 * cap)
+        limit = min(left, motion.step)
         return Course(limit, limit, motion.rates.linear, ball, 0)
     if motion.kind == SKID:
         contact = work.contact[0]
