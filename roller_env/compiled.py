@@ -41,21 +41,7 @@ def compiled_with_package(function: Callable[_P, _R]) -> Callable[_P, _R]:
     compiled anew when any of them has changed. It makes no arrays, so that none has to be counted:
     counting the references to arguments, an atomic operation each, cost as much as the work.
     """
-    return _with_package(function, inline=False)
-
-
-def inlined_with_package(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Return ``function`` compiled as `compiled_with_package` does, into whatever calls it.
-
-    For what has one caller, and arguments that cost more to pass than it takes to work on them: an
-    array is seven numbers.
-    """
-    return _with_package(function, inline=True)
-
-
-def _with_package(function: Callable[_P, _R], *, inline: bool) -> Callable[_P, _R]:
-    # Numba has no public name for the switch of its counting runtime; see `numba.core.options`.
-    dispatcher = _dispatcher(function, nogil=True, _nrt=False, forceinline=inline)
+    dispatcher = _dispatcher(function, nogil=True, _nrt=False)
     file = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if file is not None:
         # Of the function's own file, as Numba has it; it has no name for a stamp of several.
@@ -63,7 +49,38 @@ def _with_package(function: Callable[_P, _R], *, inline: bool) -> Callable[_P, _
     return cast("Callable[_P, _R]", dispatcher)
 
 
-def _dispatcher(function: Callable[..., Any], **options: bool) -> Any:
+def part_of_package(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Return ``function`` compiled as a part of what `compiled_with_package` compiles.
+
+    Python cannot call it, and nothing is kept of it alone, which takes a fifth of the time off.
+    """
+    return _part(function, inline=False)
+
+
+def inlined_in_package(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Return ``function`` compiled as `part_of_package` does, into whatever calls it.
+
+    For what has one caller, and arguments that cost more to pass than it takes to work on them: an
+    array is seven numbers.
+    """
+    return _part(function, inline=True)
+
+
+def _part(function: Callable[_P, _R], *, inline: bool) -> Callable[_P, _R]:
+    # Numba has public names for neither the switch of its counting runtime nor those of the
+    # wrappers it makes for Python and C; see `numba.core.options`.
+    options: dict[str, Any] = {
+        "error_model": "numpy",
+        "nogil": True,
+        "forceinline": inline,
+        "_nrt": False,
+        "no_cpython_wrapper": True,
+        "no_cfunc_wrapper": True,
+    }
+    return cast("Callable[_P, _R]", numba.njit(**options)(function))
+
+
+def _dispatcher(function: Callable[..., Any], **options: Any) -> Any:
     try:
         return numba.njit(cache=True, error_model="numpy", **options)(function)
     except RuntimeError:

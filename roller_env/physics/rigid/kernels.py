@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.compiled import compiled_with_package as kernel
-from roller_env.compiled import inlined_with_package as inlined
+from roller_env.compiled import compiled_with_package as entry
+from roller_env.compiled import inlined_in_package as inlined
+from roller_env.compiled import part_of_package as kernel
 
-__all__ = ["inlined", "kernel"]
+__all__ = ["entry", "inlined", "kernel"]
 
 Vector = tuple[float, float, float]
 

@@ -13,6 +13,7 @@ from roller_env.physics.rigid.kernels import (
     Record,
     Vector,
     add,
+    entry,
     inlined,
     kernel,
     plus,
@@ -28,7 +29,7 @@ Int64 = npt.NDArray[np.int64]
 _PARALLEL: Final = 1e-15
 
 
-@kernel
+@entry
 def cast_rays(
     scenes: Scenes,
     level_of_row: Int64,

@@ -42,6 +42,7 @@ from roller_env.physics.rigid.kernels import (
     Records,
     Twist,
     Vector,
+    entry,
     inlined,
     kernel,
     norm,
@@ -95,7 +96,7 @@ class Course(NamedTuple):
     alone: int  # 1 if the ball is known to meet nothing, and to leave nothing
 
 
-@kernel
+@entry
 def advance(
     scenes: Scenes,
     level_of_row: Int64,

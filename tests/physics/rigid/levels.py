@@ -8,7 +8,7 @@ from roller_env.compile.merge import merge_solids
 from roller_env.compile.mjcf import SCRIPT_RATE_HZ
 from roller_env.level import load_level
 from roller_env.level.expand import rotation_matrix, solids
-from roller_env.level.schema import Level, Material
+from roller_env.level.schema import Gate, Level, Material, Plate
 from roller_env.physics.rigid.scene import STATIC, RigidLevel, SolidBox
 
 NAMES = ("flat", "bridge", "lift", "gate", "classic")
@@ -26,10 +26,11 @@ def rigid_level(name: str) -> tuple[Level, RigidLevel]:
         for pad in level.lift_pads
     ]
     stops: list[float] = []
-    for piece, stop, yaw in [
+    pieces: list[tuple[Plate | Gate, float, float]] = [
         *((plate, plate.sinks_to, 0.0) for plate in level.plates),
         *((gate, gate.lowers_to, gate.yaw_deg) for gate in level.gates),
-    ]:
+    ]
+    for piece, stop, yaw in pieces:
         half = [edge / 2 for edge in piece.size]
         box = _box(level, Material(), piece.at, half, rotation_matrix(yaw), len(stops))
         boxes.append(box)
