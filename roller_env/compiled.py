@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property, update_wrapper
 from importlib import import_module
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar, cast
-
-import numba
-from numba.core import event
+from types import ModuleType
+from typing import Any, Final, Generic, ParamSpec, TypeVar, cast
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -42,7 +40,7 @@ def compiled_with_packages(
 
     The function may use functions and constants of all modules in its own directory, and in those
     of the packages ``others``: what was kept of it is compiled anew when any of them has changed.
-    One that does not make arrays consists of `device_function`s.
+    One that does not make arrays consists of device functions.
     """
 
     def decorate(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -58,25 +56,69 @@ def compiled_with_packages(
     return decorate
 
 
-compiled_with_package = compiled_with_packages()
+compiled_with_package = compiled_with_packages(makes_arrays=False)
 """Decorates a function that uses those of its own directory alone."""
 
 
-def device_function(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Return ``function`` compiled as part of the kernels that use it, and kept with them.
+class DeviceFunction(Generic[_P, _R]):
+    """A function that is compiled as part of the kernels that use it, and kept with them.
 
     It makes no arrays. So Numba need not count who holds the dozens that are handed from one to the
     other, which took longer than all that is computed; and a graphics card could run it.
+
+    Numba is asked for it when it is first needed, since who only reads a level does not wait for
+    Numba.
     """
-    return cast("Callable[_P, _R]", _jit(function, nogil=True, _nrt=False))
+
+    def __init__(self, function: Callable[_P, _R]):
+        """Wrap ``function``."""
+        self.function = function
+        update_wrapper(self, function)
+
+    @cached_property
+    def dispatcher(self) -> Any:
+        """What Numba has of it."""
+        return _jit(self.function, nogil=True, _nrt=False)
+
+    def __call__(self, *arguments: _P.args, **named: _P.kwargs) -> _R:
+        """Call it from Python."""
+        return cast("_R", self.dispatcher(*arguments, **named))
+
+
+def device_function(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Return ``function`` as a `DeviceFunction`."""
+    return DeviceFunction(function)
 
 
 def inlined(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Return ``function`` compiled as a `device_function`, and put where it is called.
+    """Return ``function`` compiled as a device function, and put where it is called.
 
-    For what is handed dozens of arrays, which would be copied for the call.
+    For what is handed dozens of arrays, which would be copied for the call, or has one caller.
+    Python cannot call it.
     """
-    return cast("Callable[_P, _R]", _jit(function, nogil=True, _nrt=False, forceinline=True))
+    return _hidden(function, forceinline=True)
+
+
+def part(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Return ``function`` compiled as a device function that Python cannot call.
+
+    That takes a fifth of the time of compiling.
+    """
+    return _hidden(function)
+
+
+def _hidden(function: Callable[_P, _R], **options: bool) -> Callable[_P, _R]:
+    # Numba has public names for neither the switch of its counting runtime nor those of the
+    # wrappers it makes for Python and C; see `numba.core.options`.
+    hidden = _jit(
+        function,
+        nogil=True,
+        _nrt=False,
+        no_cpython_wrapper=True,
+        no_cfunc_wrapper=True,
+        **options,
+    )
+    return cast("Callable[_P, _R]", hidden)
 
 
 def spliced(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -94,30 +136,50 @@ def _dispatcher(function: Callable[..., Any], **options: bool) -> Any:
 
 
 def _jit(function: Callable[..., Any], **options: Any) -> Any:
-    return numba.njit(error_model="numpy", **options)(function)
+    return _numba().njit(error_model="numpy", **options)(function)
+
+
+@cache
+def _numba() -> ModuleType:
+    """Return Numba, which knows what a `DeviceFunction` is and tells who waits for it."""
+    import numba
+    from numba.core import event
+    from numba.extending import typeof_impl
+
+    @typeof_impl.register(DeviceFunction)  # type: ignore[untyped-decorator]
+    def _(function: DeviceFunction[..., Any], context: Any) -> Any:
+        return numba.typeof(function.dispatcher)
+
+    class Waiting(event.Listener):
+        """Hears when Numba compiles, which it does not when it finds what it had compiled."""
+
+        def on_start(self, event: event.Event) -> None:
+            _WAIT.say(event.data["dispatcher"].py_func.__module__)
+
+        def on_end(self, event: event.Event) -> None:
+            pass
+
+    event.register("numba:compile", Waiting())  # type: ignore[no-untyped-call]
+    return numba
 
 
 @cache
 def _stamp(directory: Path) -> tuple[tuple[str, float, int], ...]:
-    """Return what changes when a module of a directory does."""
-    files = sorted(directory.glob("*.py"))
+    """Return what changes when a module of a directory does, or how it is compiled."""
+    files = [Path(__file__), *sorted(directory.glob("*.py"))]
     states = [(file.name, file.stat()) for file in files]
     return tuple((name, state.st_mtime, state.st_size) for name, state in states)
 
 
-class _Wait(event.Listener):
-    """Says on the terminal, once a process, what the first step waits for when it has to.
-
-    Numba broadcasts the event when it compiles, and not when it finds what it had compiled before.
-    """
+class _Wait:
+    """Says on the terminal, once a process, what the first step waits for when it has to."""
 
     def __init__(self) -> None:
         self.said = False
         self.kept = True
 
-    def on_start(self, event: event.Event) -> None:
-        """Say it, if it is our function that Numba begins with."""
-        module = event.data["dispatcher"].py_func.__module__
+    def say(self, module: str) -> None:
+        """Say it, if the function that Numba begins with is of a module of ours."""
         if self.said or module.partition(".")[0] != __name__.partition(".")[0]:
             return
         self.said = True
@@ -130,9 +192,5 @@ class _Wait(event.Listener):
             )
         print(f"Roller: compiling the rules (up to half a minute), {how_often}", file=sys.stderr)
 
-    def on_end(self, event: event.Event) -> None:
-        """Say nothing."""
 
-
-_WAIT = _Wait()
-event.register("numba:compile", _WAIT)  # type: ignore[no-untyped-call]
+_WAIT: Final = _Wait()

@@ -44,7 +44,12 @@ def make_physics(
         substeps: physics steps in a control step.
         num_threads: native threads; 0 means one for each CPU.
     """
-    # Here, since one engine needs not what the other is made of.
+    # Here, since one engine does not need what the other is made of.
+    if preset.engine == "rigid":
+        from roller_env.compile.rigid import RigidPhysics
+
+        duration_s = substeps * preset.dt_s
+        return RigidPhysics(level, num_envs, substeps, num_threads, duration_s)
     from roller_env.compile.compiled import compile_level
     from roller_env.compile.physics import MujocoPhysics
 
@@ -520,11 +525,14 @@ class Simulation:
         return out
 
     def _cast_rays(self, rows: Int64 | None, envs: Int64) -> Float32:
-        ball = self._bodies.position[envs]
-        level_origins = np.broadcast_to(ball[:, None, :], (len(ball), len(self._ray_directions), 3))
-        level_rays = self._physics.rays(level_origins, self._ray_directions, rows)
-        down = np.broadcast_to([0.0, 0.0, -1.0], self._scan_offsets.shape)
-        scan = self._physics.rays(ball[:, None, :] + self._scan_offsets, down, rows)
+        level_rays = self._physics.rays(
+            np.zeros_like(self._ray_directions),
+            self._ray_directions,
+            observations.RAY_RANGE_M,
+            rows,
+        )
+        down = np.tile([0.0, 0.0, -1.0], (len(self._scan_offsets), 1))
+        scan = self._physics.rays(self._scan_offsets, down, np.inf, rows)
         radius = self.table.ball_radius[self._games.level_of[envs]]
         return observations.ray_observation(level_rays, scan, radius)
 

@@ -18,7 +18,6 @@ from roller_env.level.schema import Level, Material
 from roller_env.physics.materials import contact_parameters
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.pieces.piece import Mover, Solid, path_of
-from roller_env.units import SCRIPT_RATE_HZ
 
 BALL: Final = "ball"
 FORCE_ACTUATORS: Final = ("force_x", "force_y", "lift")
@@ -155,12 +154,9 @@ def _add_mover(spec: mujoco.MjSpec, level: Level, mover: Mover, contact: dict[st
     """Add a slab that an integrated-velocity servo moves down its slide joint to its stop.
 
     The servo's control is the slab's velocity in m/s; its activation is the set-point, clamped
-    where the original stops. The original tests ``z > stop`` before each decrement, so it ends up
-    to one frame of travel below the stop: the clamp lies half a frame below, on average the same,
-    and the slab does pass the stop.
+    where the slab stands still.
     """
     name, solid = mover.name, mover.solid
-    travel = mover.stop - 0.5 * mover.speed / SCRIPT_RATE_HZ - solid.centre[2]
     mass = MOVER_MASS_RATIO * level.ball.mass_kg
     kp = mass * SERVO_FREQUENCY**2
     body = spec.worldbody.add_body(
@@ -184,7 +180,7 @@ def _add_mover(spec: mujoco.MjSpec, level: Level, mover: Mover, contact: dict[st
     servo.biastype = mujoco.mjtBias.mjBIAS_AFFINE
     servo.biasprm[1:3] = [-kp, -2.0 * mass * SERVO_FREQUENCY]
     servo.actlimited = True
-    servo.actrange = [travel, 0.0]
+    servo.actrange = [mover.travel, 0.0]
     most = SERVO_G * mass * STANDARD_GRAVITY
     servo.forcelimited = True
     servo.forcerange = [-most, most]

@@ -57,6 +57,11 @@ class MujocoPhysics:
         """Say which worlds, (N,), MuJoCo has warned of."""
         return self._stepper.diverged()
 
-    def rays(self, origins: Float64, directions: Float64, worlds: Int64 | None) -> Float64:
+    def rays(
+        self, offsets: Float64, directions: Float64, longest: float, worlds: Int64 | None
+    ) -> Float64:
         """Return the distances, (n, rays) metres, to the first geom that is not the ball."""
+        first = self.columns.position
+        ball = self.state[:, first : first + 3]
+        origins = (ball if worlds is None else ball[worlds])[:, None, :] + offsets
         return self._stepper.rays(origins, directions, self._ball, worlds)

@@ -7,6 +7,7 @@ from typing import Final, Literal, get_args
 
 from roller_env import checks
 
+Engine = Literal["mujoco", "rigid"]
 Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
 Cone = Literal["elliptic", "pyramidal"]
 Solver = Literal["Newton", "PGS", "CG"]
@@ -20,7 +21,9 @@ _LONGEST_NAME: Final = 200
 
 @dataclass(frozen=True, slots=True)
 class PhysicsPreset:
-    """One setting of MuJoCo's solver; the level's geometry and materials are not part of it.
+    """One setting of an engine; the level's geometry and materials are not part of it.
+
+    Of ``rigid`` only the name and ``dt_s`` count: how finely the ball's path is kept for the rules.
 
     Attributes:
         name: what the ``physics`` option of the environments calls it.
@@ -33,6 +36,7 @@ class PhysicsPreset:
             cheaper; it takes more iterations, above all where a gate presses on the ball.
         iterations: most iterations of the solver in a step.
         tolerance: improvement at which the solver stops before that.
+        engine: ``mujoco``, or ``rigid``: `roller_env.physics.rigid`.
 
     Raises:
         ValueError: a value is not allowed; the message says what is.
@@ -46,6 +50,7 @@ class PhysicsPreset:
     solver: Solver = "Newton"
     iterations: int = 20
     tolerance: float = 1e-8
+    engine: Engine = "mujoco"
 
     def __post_init__(self) -> None:
         """Refuse what MuJoCo cannot compute with, or not in any reasonable time."""
@@ -55,6 +60,7 @@ class PhysicsPreset:
             {
                 "name": lambda: _name(self.name),
                 "dt_s": lambda: number("physics.dt_s", self.dt_s, MIN_DT_S, 1.0, seconds),
+                "engine": lambda: one_of("physics.engine", self.engine, get_args(Engine)),
                 "integrator": lambda: one_of(
                     "physics.integrator", self.integrator, get_args(Integrator)
                 ),
@@ -108,8 +114,11 @@ Errors: 0.00006 % after 5 s of driving, headings exact, 0.05 % on the classic co
 fall 0.07 of what falls through, elasticity 0.019, friction 0.0001. Cost: 15 CPU ms for a simulated
 second."""
 
+RIGID: Final = PhysicsPreset("rigid", dt_s=1 / 240, engine="rigid")
+"""The rigid-ball engine: exact impacts and rolling, no softness, many times cheaper."""
+
 PRESETS: Final[dict[str, PhysicsPreset]] = {
-    preset.name: preset for preset in (FAST, DEFAULT, ACCURATE)
+    preset.name: preset for preset in (FAST, DEFAULT, ACCURATE, RIGID)
 }
 """By name. Their errors and costs are from ``python scripts/presets.py``; see docs/presets.md."""
 

@@ -74,11 +74,14 @@ class Physics(Protocol):
     def diverged(self) -> Bool:
         """Say which worlds, (N,), the engine has given up on since their last `reset`."""
 
-    def rays(self, origins: Float64, directions: Float64, worlds: Int64 | None) -> Float64:
+    def rays(
+        self, offsets: Float64, directions: Float64, longest: float, worlds: Int64 | None
+    ) -> Float64:
         """Return the distances, (n, rays) metres, to the first solid along each ray; else ``inf``.
 
         Args:
-            origins: (n, rays, 3) metres, world frame.
+            offsets: (rays, 3) where they begin, from the ball's centre, metres, world frame.
             directions: (rays, 3) unit vectors, world frame.
+            longest: what is further need not be found, metres.
             worlds: which; None for all.
         """

@@ -9,8 +9,17 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from roller_env.physics.rigid.kernels import Vector, dot, first_root, kernel, norm, row
-from roller_env.physics.rigid.scene import Scene
+from roller_env.physics.rigid.kernels import (
+    Record,
+    Vector,
+    dot,
+    first_root,
+    kernel,
+    norm,
+    row,
+    sub,
+    vector,
+)
 
 FACE: Final = 1
 EDGE: Final = 2
@@ -21,20 +30,20 @@ SLACK_M: Final = 2e-9
 
 
 @kernel
-def local(scene: Scene, box: int, point: Vector) -> Vector:
+def local(solid: Record, point: Vector) -> Vector:
     """Return a vector of the world in the box's own axes."""
-    if scene.aligned[box]:
+    if solid.aligned:
         return point
-    axes = scene.axes[box]
+    axes = solid.axes
     return dot(row(axes, 0), point), dot(row(axes, 1), point), dot(row(axes, 2), point)
 
 
 @kernel
-def world(scene: Scene, box: int, point: Vector) -> Vector:
+def world(solid: Record, point: Vector) -> Vector:
     """Return a vector of the box's own axes in the world's."""
-    if scene.aligned[box]:
+    if solid.aligned:
         return point
-    axes = scene.axes[box]
+    axes = solid.axes
     return (
         axes[0, 0] * point[0] + axes[1, 0] * point[1] + axes[2, 0] * point[2],
         axes[0, 1] * point[0] + axes[1, 1] * point[1] + axes[2, 1] * point[2],
@@ -43,12 +52,18 @@ def world(scene: Scene, box: int, point: Vector) -> Vector:
 
 
 @kernel
-def closest(scene: Scene, box: int, from_centre: Vector) -> tuple[float, Vector, int, int]:
+def from_centre(solid: Record, shift: float, point: Vector) -> Vector:
+    """Return a point relative to the centre of a box that has moved by ``shift`` along z."""
+    relative = sub(point, vector(solid.centre))
+    return relative[0], relative[1], relative[2] - shift
+
+
+@kernel
+def closest(solid: Record, from_centre: Vector) -> tuple[float, Vector, int, int]:
     """Return how far a point is from a box, and along what.
 
     Args:
-        scene: the solids.
-        box: which.
+        solid: the box.
         from_centre: the point relative to the box's centre, world axes.
 
     Returns:
@@ -57,8 +72,8 @@ def closest(scene: Scene, box: int, from_centre: Vector) -> tuple[float, Vector,
         kind: `FACE`, `EDGE` or `CORNER`.
         axis: of a face its normal's axis of the box, of an edge its own, of a corner -1.
     """
-    at = local(scene, box, from_centre)
-    half = row(scene.half, box)
+    at = local(solid, from_centre)
+    half = vector(solid.half)
     out = (
         at[0] - min(max(at[0], -half[0]), half[0]),
         at[1] - min(max(at[1], -half[1]), half[1]),
@@ -66,9 +81,9 @@ def closest(scene: Scene, box: int, from_centre: Vector) -> tuple[float, Vector,
     )
     beyond = int(out[0] != 0.0) + int(out[1] != 0.0) + int(out[2] != 0.0)
     if beyond == 0:
-        return _inside(scene, box, at, half)
+        return _inside(solid, at, half)
     distance = norm(out)
-    normal = world(scene, box, (out[0] / distance, out[1] / distance, out[2] / distance))
+    normal = world(solid, (out[0] / distance, out[1] / distance, out[2] / distance))
     axis = -1
     for k in range(3):
         # The one axis beyond which it lies (face), or does not (edge).
@@ -78,7 +93,7 @@ def closest(scene: Scene, box: int, from_centre: Vector) -> tuple[float, Vector,
 
 
 @kernel
-def _inside(scene: Scene, box: int, at: Vector, half: Vector) -> tuple[float, Vector, int, int]:
+def _inside(solid: Record, at: Vector, half: Vector) -> tuple[float, Vector, int, int]:
     """Return the way out of a box, by the nearest face."""
     axis, depth = 0, half[0] - abs(at[0])
     for k in range(1, 3):
@@ -90,7 +105,7 @@ def _inside(scene: Scene, box: int, at: Vector, half: Vector) -> tuple[float, Ve
         sign if axis == 1 else 0.0,
         sign if axis == 2 else 0.0,
     )
-    return -depth, world(scene, box, out), FACE, axis
+    return -depth, world(solid, out), FACE, axis
 
 
 @kernel
@@ -101,8 +116,7 @@ def is_beyond(kind: int, axis: int, k: int) -> bool:
 
 @kernel
 def time_on_feature(
-    scene: Scene,
-    box: int,
+    solid: Record,
     kind: int,
     axis: int,
     from_centre: Vector,
@@ -112,20 +126,19 @@ def time_on_feature(
     """Return for how long a point on a parabola has the same nearest feature, seconds or ``inf``.
 
     Args:
-        scene: the solids.
-        box: which.
+        solid: the box.
         kind: of the feature, as `closest` returns it.
         axis: likewise.
         from_centre: the point relative to the box's centre, world axes, metres.
         velocity: relative to the box, m/s.
         acceleration: likewise, m/s^2.
     """
-    at = local(scene, box, from_centre)
-    v = local(scene, box, velocity)
-    a = local(scene, box, acceleration)
+    at = local(solid, from_centre)
+    v = local(solid, velocity)
+    a = local(solid, acceleration)
     time = math.inf
     for k in range(3):
-        half = scene.half[box, k]
+        half = solid.half[k]
         if is_beyond(kind, axis, k):
             if kind != FACE:
                 sign = 1.0 if at[k] > 0.0 else -1.0
@@ -138,12 +151,12 @@ def time_on_feature(
 
 
 @kernel
-def feature_margin(scene: Scene, box: int, kind: int, axis: int, from_centre: Vector) -> float:
+def feature_margin(solid: Record, kind: int, axis: int, from_centre: Vector) -> float:
     """Return how far inside a feature's Voronoi region a point lies, negative outside, metres."""
-    at = local(scene, box, from_centre)
+    at = local(solid, from_centre)
     margin = math.inf
     for k in range(3):
-        half = scene.half[box, k]
+        half = solid.half[k]
         if not is_beyond(kind, axis, k):
             margin = min(margin, half - abs(at[k]))
         elif kind != FACE:
@@ -152,8 +165,8 @@ def feature_margin(scene: Scene, box: int, kind: int, axis: int, from_centre: Ve
 
 
 @kernel
-def extent(scene: Scene, box: int, direction: Vector) -> float:
+def extent(solid: Record, direction: Vector) -> float:
     """Return how far a box reaches from its centre along a unit vector, metres."""
-    along = local(scene, box, direction)
-    half = row(scene.half, box)
+    along = local(solid, direction)
+    half = vector(solid.half)
     return abs(along[0]) * half[0] + abs(along[1]) * half[1] + abs(along[2]) * half[2]

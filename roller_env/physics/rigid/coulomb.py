@@ -24,12 +24,11 @@ if there is any.
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
-
-import numpy as np
-import numpy.typing as npt
+from typing import Final
 
 from roller_env.physics.rigid.kernels import (
+    Record,
+    Twist,
     Vector,
     add,
     cross,
@@ -40,14 +39,14 @@ from roller_env.physics.rigid.kernels import (
     put,
     row,
     scaled,
+    store,
     sub,
     tangential,
+    vector,
 )
+from roller_env.physics.rigid.linear import eliminate
 
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
-
-MOST_CONTACTS: Final = 8
+EXACT: Final = 1e-9
 
 OPEN: Final = 0
 STICKS: Final = 1
@@ -58,229 +57,212 @@ _SPIN_PER_IMPULSE: Final = 2.5
 _FIRST_SWEEPS: Final = 8
 _MOST_ATTEMPTS: Final = 8
 _MOST_NEWTON_STEPS: Final = 12
-_SINGULAR: Final = 1e-11
 _ROUNDING: Final = 1e-14
+_SINGULAR: Final = 1e-11
+
 _ABSURD: Final = 1e6
 """Impulses that grow beyond this, over the speeds there are, have no end: nothing rigid gives."""
 
 
-class Contacts(NamedTuple):
-    """Working memory for up to `MOST_CONTACTS` contacts of one ball, one a row."""
-
-    box: Int64
-    kind: Int64  # of the feature that is touched
-    axis: Int64
-    gap: Float64
-    normal: Float64  # (K, 3) from the solid to the ball
-    pivot: Float64  # (K, 3) a point of the edge, or the corner, that is touched
-    edge: Float64  # (K, 3) direction of the edge that is touched
-    friction: Float64
-    elasticity: Float64
-    moving: Float64  # (K, 3) velocity of the solid
-    surface: Float64  # (K, 3) what the slip is measured against: s
-    bias: Float64  # b
-    slides: npt.NDArray[np.bool_]  # the slip has a direction already
-    direction: Float64  # (K, 3) that direction
-    status: Int64  # the answer: `OPEN`, `STICKS` or `SLIPS`
-    push: Float64  # the answer: N
-    drag: Float64  # (K, 3) the answer: T
-    response: Float64  # (3 K, 3 K) rates of change by unit impulses
-    system: Float64  # (3 K, 3 K + 1)
-    columns: Int64  # (3 K,)
-    frame: Float64  # (3 K, 3) normal and two tangents of every contact
-    active: Int64
+@kernel
+def slip_over(normal: Vector, surface: Vector, radius: float, twist: Twist) -> Vector:
+    """Return the velocity of the ball's point of contact over a surface."""
+    across = tangential(sub(twist.linear, surface), normal)
+    return plus(across, radius, cross(normal, twist.angular))
 
 
 @kernel
-def make_contacts() -> Contacts:
-    """Return working memory; compiled code makes it once for many balls."""
-    k = MOST_CONTACTS
-    return Contacts(
-        np.zeros(k, np.int64),
-        np.zeros(k, np.int64),
-        np.zeros(k, np.int64),
-        np.zeros(k),
-        np.zeros((k, 3)),
-        np.zeros((k, 3)),
-        np.zeros((k, 3)),
-        np.zeros(k),
-        np.zeros(k),
-        np.zeros((k, 3)),
-        np.zeros((k, 3)),
-        np.zeros(k),
-        np.zeros(k, np.bool_),
-        np.zeros((k, 3)),
-        np.zeros(k, np.int64),
-        np.zeros(k),
-        np.zeros((k, 3)),
-        np.zeros((3 * k, 3 * k)),
-        np.zeros((3 * k, 3 * k + 1)),
-        np.zeros(3 * k, np.int64),
-        np.zeros((3 * k, 3)),
-        np.zeros(k, np.int64),
+def slip(contact: Record, radius: float, twist: Twist) -> Vector:
+    """Return the slip at a contact over its ``surface``."""
+    return slip_over(vector(contact.normal), vector(contact.surface), radius, twist)
+
+
+@kernel
+def excess(contact: Record, v: Vector) -> float:
+    """Return by how much a contact opens faster than it must; negative where it closes."""
+    opening = dot(vector(contact.normal), sub(v, vector(contact.surface)))
+    excess: float = opening - contact.bias
+    return excess
+
+
+@kernel
+def _apply(contact: Record, radius: float, twist: Twist, push: float, drag: Vector) -> Twist:
+    """Return the velocities after an impulse: ``push`` along the normal, ``drag`` across it."""
+    n = vector(contact.normal)
+    torque = cross(n, drag)
+    return Twist(
+        add(plus(twist.linear, push, n), drag),
+        plus(twist.angular, -_SPIN_PER_IMPULSE / radius, torque),
     )
 
 
 @kernel
-def swap(c: Contacts, i: int, j: int) -> None:
-    """Exchange what two rows say of their contacts (not the answers, nor working memory)."""
-    if i == j:
-        return
-    c.box[i], c.box[j] = c.box[j], c.box[i]
-    c.kind[i], c.kind[j] = c.kind[j], c.kind[i]
-    c.axis[i], c.axis[j] = c.axis[j], c.axis[i]
-    c.gap[i], c.gap[j] = c.gap[j], c.gap[i]
-    c.friction[i], c.friction[j] = c.friction[j], c.friction[i]
-    c.elasticity[i], c.elasticity[j] = c.elasticity[j], c.elasticity[i]
-    c.bias[i], c.bias[j] = c.bias[j], c.bias[i]
-    c.slides[i], c.slides[j] = c.slides[j], c.slides[i]
-    c.status[i], c.status[j] = c.status[j], c.status[i]
-    c.push[i], c.push[j] = c.push[j], c.push[i]
-    for k in range(3):
-        c.normal[i, k], c.normal[j, k] = c.normal[j, k], c.normal[i, k]
-        c.pivot[i, k], c.pivot[j, k] = c.pivot[j, k], c.pivot[i, k]
-        c.edge[i, k], c.edge[j, k] = c.edge[j, k], c.edge[i, k]
-        c.moving[i, k], c.moving[j, k] = c.moving[j, k], c.moving[i, k]
-        c.surface[i, k], c.surface[j, k] = c.surface[j, k], c.surface[i, k]
-        c.direction[i, k], c.direction[j, k] = c.direction[j, k], c.direction[i, k]
-        c.drag[i, k], c.drag[j, k] = c.drag[j, k], c.drag[i, k]
-
-
-@kernel
-def slip(c: Contacts, i: int, radius: float, v: Vector, w: Vector) -> Vector:
-    """Return the velocity of the ball's point at contact ``i`` over the surface."""
-    n = row(c.normal, i)
-    return plus(tangential(sub(v, row(c.surface, i)), n), radius, cross(n, w))
-
-
-@kernel
-def excess(c: Contacts, i: int, v: Vector) -> float:
-    """Return by how much contact ``i`` opens faster than it must; negative where it closes."""
-    bias: float = c.bias[i]
-    return dot(row(c.normal, i), sub(v, row(c.surface, i))) - bias
-
-
-@kernel
-def _apply(
-    c: Contacts, i: int, radius: float, v: Vector, w: Vector, push: float, drag: Vector
-) -> tuple[Vector, Vector]:
-    """Return the velocities after an impulse: ``push`` along the normal, ``drag`` across it."""
-    n = row(c.normal, i)
-    torque = cross(n, drag)
-    return add(plus(v, push, n), drag), plus(w, -_SPIN_PER_IMPULSE / radius, torque)
-
-
-@kernel
-def solve(
-    c: Contacts, count: int, radius: float, v: Vector, w: Vector
-) -> tuple[Vector, Vector, bool]:
+def solve(work: Record, count: int, radius: float, free: Twist, alike: float) -> tuple[Twist, bool]:
     """Return the velocities after the contacts' impulses, and whether they are the answer.
 
     Works on rates of any kind: velocities, or accelerations. Writes ``status``, ``push`` and
-    ``drag`` of the first ``count`` contacts.
+    ``drag`` of the first ``count`` contacts; reads what says their problem.
 
     Args:
-        c: the contacts; ``normal``, ``friction``, ``surface``, ``bias``, ``slides``, ``direction``.
+        work: the contacts.
         count: how many.
         radius: of the ball.
-        v: velocity of the centre without the contacts.
-        w: angular velocity without them.
+        free: velocities without the contacts.
+        alike: share of what is asked of two points of contact by which that may differ along the
+            line between them, where both stick: `EXACT`, or more for a step in time.
     """
-    for i in range(count):
-        c.push[i] = 0.0
-        put(c.drag, i, (0.0, 0.0, 0.0))
     if count == 1:
-        v, w, _ = _sweep(c, count, radius, v, w)
-        return v, w, True
+        work.contact[0].push = 0.0
+        store(work.contact[0].drag, (0.0, 0.0, 0.0))
+        twist, _ = _sweep(work, count, radius, free)
+        return twist, True
     if count == 2:
-        done, after_v, after_w = _both_stick(c, radius, v, w)
-        if done:
-            return after_v, after_w, True
-    scale = _scale(c, count, radius, v, w)
-    free_v, free_w = v, w
-    sweeps = _FIRST_SWEEPS
-    for _ in range(_MOST_ATTEMPTS):
-        for _ in range(sweeps):
-            v, w, change = _sweep(c, count, radius, v, w)
-            if change <= _ROUNDING * scale:
-                return v, w, True
-            if change > _ABSURD * scale:
-                return v, w, False
-        done, after_v, after_w = _polish(c, count, radius, free_v, free_w, scale)
-        if done:
-            return after_v, after_w, True
-        sweeps *= 3
-    return v, w, False
+        _, stick, twist = _both_stick(work, radius, free, alike)
+        if stick:
+            work.contact[0].status, work.contact[1].status = STICKS, STICKS
+            return twist, True
+    scale = _scale(work, count, radius, free)
+    done, twist = _enumerate(work, count, radius, free, scale)
+    if done:
+        return twist, True
+    for i in range(count):
+        contact = work.contact[i]
+        contact.push = 0.0
+        store(contact.drag, (0.0, 0.0, 0.0))
+    return _iterate(work, count, radius, free, scale)
 
 
 @kernel
-def _scale(c: Contacts, count: int, radius: float, v: Vector, w: Vector) -> float:
-    scale = norm(v) + radius * norm(w) + 1e-12
+def _enumerate(
+    work: Record, count: int, radius: float, free: Twist, scale: float
+) -> tuple[bool, Twist]:
+    """Return whether guesses of what every contact does lead to an answer, and the velocities.
+
+    First all press, and stick if they do not slip already; then those that would pull open, one
+    after the other; then those that would leave their cone begin to slip.
+    """
     for i in range(count):
-        scale = max(scale, norm(row(c.surface, i)), abs(c.bias[i]))
+        contact = work.contact[i]
+        contact.status = SLIPS if contact.slides else STICKS
+    twist = free
+    for _ in range(count):
+        twist = _hold_known(work, count, radius, free)
+        kept = _kept(work, count, radius, twist, scale)
+        if kept and _satisfied(work, count, twist.linear, scale):
+            return True, twist
+        most, pulls = 0.0, -1
+        for i in range(count):
+            if work.contact[i].push < most:
+                most, pulls = work.contact[i].push, i
+        if pulls < 0:
+            break
+        work.contact[pulls].status = OPEN
+    begins = False
+    for i in range(count):
+        contact = work.contact[i]
+        drag, most = vector(contact.drag), contact.friction * contact.push
+        if contact.status == STICKS and norm(drag) > most:
+            contact.status = SLIPS
+            store(contact.drag, scaled(max(most, 0.0) / norm(drag), drag))
+            begins = True
+    if begins:
+        return _polish(work, count, radius, free, scale)
+    return False, twist
+
+
+@kernel
+def _iterate(
+    work: Record, count: int, radius: float, free: Twist, scale: float
+) -> tuple[Twist, bool]:
+    """Return what `solve` does, by sweeps over the contacts and Newton's method."""
+    twist = free
+    sweeps = _FIRST_SWEEPS
+    for _ in range(_MOST_ATTEMPTS):
+        for _ in range(sweeps):
+            twist, change = _sweep(work, count, radius, twist)
+            if change <= _ROUNDING * scale:
+                return twist, True
+            if change > _ABSURD * scale:
+                return twist, False
+        done, polished = _polish(work, count, radius, free, scale)
+        if done:
+            return polished, True
+        sweeps *= 3
+    return twist, False
+
+
+@kernel
+def _scale(work: Record, count: int, radius: float, twist: Twist) -> float:
+    scale = norm(twist.linear) + radius * norm(twist.angular) + 1e-12
+    for i in range(count):
+        contact = work.contact[i]
+        scale = max(scale, norm(vector(contact.surface)), abs(contact.bias))
     return scale
 
 
 @kernel
-def _sweep(
-    c: Contacts, count: int, radius: float, v: Vector, w: Vector
-) -> tuple[Vector, Vector, float]:
+def _sweep(work: Record, count: int, radius: float, twist: Twist) -> tuple[Twist, float]:
     """Solve every contact once, given the others; return the velocities and the largest change."""
     change = 0.0
     for i in range(count):
-        push = max(c.push[i] - excess(c, i, v), 0.0)
-        old = row(c.drag, i)
-        most = c.friction[i] * push
-        if c.slides[i]:
-            drag = scaled(-most, row(c.direction, i))
-            c.status[i] = SLIPS
+        contact = work.contact[i]
+        push = max(contact.push - excess(contact, twist.linear), 0.0)
+        old = vector(contact.drag)
+        most = contact.friction * push
+        if contact.slides:
+            drag = scaled(-most, vector(contact.direction))
+            contact.status = SLIPS
         else:
-            drag = plus(old, -1.0 / _SLIP_PER_IMPULSE, slip(c, i, radius, v, w))
+            drag = plus(old, -1.0 / _SLIP_PER_IMPULSE, slip(contact, radius, twist))
             size = norm(drag)
-            c.status[i] = STICKS
+            contact.status = STICKS
             if size > most:
                 drag = scaled(most / size, drag)
-                c.status[i] = SLIPS
+                contact.status = SLIPS
         if push == 0.0:
-            c.status[i] = OPEN
+            contact.status = OPEN
         step = sub(drag, old)
-        v, w = _apply(c, i, radius, v, w, push - c.push[i], step)
-        change = max(change, abs(push - c.push[i]), norm(step))
-        c.push[i] = push
-        put(c.drag, i, drag)
-    return v, w, change
+        twist = _apply(contact, radius, twist, push - contact.push, step)
+        change = max(change, abs(push - contact.push), norm(step))
+        contact.push = push
+        store(contact.drag, drag)
+    return twist, change
 
 
 @kernel
-def _both_stick(c: Contacts, radius: float, v: Vector, w: Vector) -> tuple[bool, Vector, Vector]:
-    """Return whether two contacts both stick, and the velocities if they do.
+def _both_stick(work: Record, radius: float, free: Twist, alike: float) -> tuple[bool, bool, Twist]:
+    """Return whether two contacts can both stick, whether they do, and the velocities if so.
 
-    The ball then turns about the line through both points of contact, and its momentum about that
-    line is kept. What the reactions are is known but for one number: the friction with which both
-    contacts can press against each other.
+    Of a rigid ball both points of contact are then given velocities, along the line through them
+    alike. About that line, on which the reactions have no moment, its momentum is kept. What the
+    reactions are is known but for one number: the friction with which both contacts can press
+    against each other. ``alike`` is the share of what is asked of the two points by which it may
+    differ along the line between them.
     """
-    if c.slides[0] or c.slides[1] or c.bias[0] != 0.0 or c.bias[1] != 0.0:
-        return False, v, w
-    for k in range(3):
-        if c.surface[0, k] != c.surface[1, k]:
-            return False, v, w
-    a, b, surface = row(c.normal, 0), row(c.normal, 1), row(c.surface, 0)
+    first, second = work.contact[0], work.contact[1]
+    a, b = vector(first.normal), vector(second.normal)
     cosine, d = dot(a, b), cross(a, b)
     sine = norm(d)
-    if sine < 1e-3:
-        return False, v, w
+    if first.slides or second.slides or sine < 1e-3:
+        return False, False, free
     d = scaled(1.0 / sine, d)
     apart = sub(a, b)
-    axis = scaled(1.0 / norm(apart), apart)
-    arm = scaled(radius, a)
-    lever = cross(axis, arm)
+    distance = norm(apart)
+    axis = scaled(1.0 / distance, apart)
+    point_a = plus(vector(first.surface), first.bias, a)
+    differ = sub(point_a, plus(vector(second.surface), second.bias, b))
+    allowed = alike * norm(differ) if first.rise == second.rise else 0.0
+    possible = abs(dot(axis, differ)) <= max(allowed, EXACT * norm(free.linear))
+    lever = cross(axis, scaled(radius, a))
     inertia = 0.4 * radius * radius
-    turning = inertia * dot(axis, w) + dot(lever, sub(v, surface))
+    tilting = scaled(-1.0 / (radius * distance), cross(axis, differ))
+    moving = plus(point_a, -radius, cross(a, tilting))
+    turning = inertia * dot(axis, free.angular) + dot(lever, sub(free.linear, moving))
     rate = turning / (inertia + dot(lever, lever))
-    after_v, after_w = plus(surface, rate, lever), scaled(rate, axis)
+    after = Twist(plus(moving, rate, lever), plus(tilting, rate, axis))
 
-    force = sub(after_v, v)
-    moment = scaled(-inertia / radius, sub(after_w, w))
+    force = sub(after.linear, free.linear)
+    moment = scaled(-inertia / radius, sub(after.angular, free.angular))
     along_a = -dot(moment, b) / sine
     along_b = dot(moment, a) / sine
     shared = dot(moment, d)
@@ -289,8 +271,8 @@ def _both_stick(c: Contacts, radius: float, v: Vector, w: Vector) -> tuple[bool,
     push_a = (ra - cosine * rb) / (sine * sine)
     push_b = (rb - cosine * ra) / (sine * sine)
     slope = -(1.0 - cosine) / sine
-    mu_a, mu_b = c.friction[0], c.friction[1]
-    best, found = 0.0, False
+    mu_a, mu_b = first.friction, second.friction
+    best, found = 0.5 * shared, False
     for candidate in range(5):
         if candidate == 0:
             t = 0.5 * shared
@@ -304,18 +286,22 @@ def _both_stick(c: Contacts, radius: float, v: Vector, w: Vector) -> tuple[bool,
         inside = (
             na >= 0.0
             and nb >= 0.0
-            and math.hypot(along_a, t) <= mu_a * na + room
-            and math.hypot(along_b, shared - t) <= mu_b * nb + room
+            and _length(along_a, t) <= mu_a * na + room
+            and _length(along_b, shared - t) <= mu_b * nb + room
         )
         if inside and (not found or abs(t - 0.5 * shared) < abs(best - 0.5 * shared)):
             best, found = t, True
-    if not found:
-        return False, v, w
-    c.push[0], c.push[1] = push_a + slope * best, push_b + slope * best
-    c.status[0], c.status[1] = STICKS, STICKS
-    put(c.drag, 0, plus(scaled(along_a, d), best, cross(d, a)))
-    put(c.drag, 1, plus(scaled(along_b, d), shared - best, cross(d, b)))
-    return True, after_v, after_w
+            if candidate == 0:
+                break
+    first.push, second.push = push_a + slope * best, push_b + slope * best
+    store(first.drag, plus(scaled(along_a, d), best, cross(d, a)))
+    store(second.drag, plus(scaled(along_b, d), shared - best, cross(d, b)))
+    return True, possible and found, after
+
+
+@kernel
+def _length(x: float, y: float) -> float:
+    return math.sqrt(x * x + y * y)
 
 
 @kernel
@@ -339,96 +325,247 @@ def _cone_edge(
 
 
 @kernel
-def hold(c: Contacts, count: int, radius: float, v: Vector, w: Vector) -> tuple[Vector, Vector]:
+def hold(work: Record, count: int, radius: float, free: Twist) -> Twist:
     """Return the velocities after the impulses of contacts that neither open nor change their mode.
 
     Every one of the first ``count`` keeps its distance; those with status `STICKS` do not slip, the
     others slip along ``direction``. Writes ``push`` and ``drag``, which may now pull or leave the
     cone: the caller asks.
     """
-    for i in range(count):
-        c.push[i] = 0.0
-        put(c.drag, i, (0.0, 0.0, 0.0))
     if count == 1:
-        push = -excess(c, 0, v)
-        if c.status[0] == STICKS:
-            drag = scaled(-1.0 / _SLIP_PER_IMPULSE, slip(c, 0, radius, v, w))
+        contact = work.contact[0]
+        push = -excess(contact, free.linear)
+        if contact.status == STICKS:
+            drag = scaled(-1.0 / _SLIP_PER_IMPULSE, slip(contact, radius, free))
         else:
-            drag = scaled(-c.friction[0] * push, row(c.direction, 0))
-        c.push[0] = push
-        put(c.drag, 0, drag)
-        return _apply(c, 0, radius, v, w, push, drag)
+            drag = scaled(-contact.friction * push, vector(contact.direction))
+        contact.push = push
+        store(contact.drag, drag)
+        return _apply(contact, radius, free, push, drag)
+    return _hold_known(work, count, radius, free)
+
+
+@kernel
+def _hold_known(work: Record, count: int, radius: float, free: Twist) -> Twist:
+    """Return what `hold` does, of two contacts or more; `OPEN` ones do nothing."""
+    if count == 2:
+        done, twist = _hold_pair(work, radius, free)
+        if done:
+            return twist
+    return _hold_several(work, count, radius, free)
+
+
+@kernel
+def _hold_pair(work: Record, radius: float, free: Twist) -> tuple[bool, Twist]:
+    """Return whether two contacts are told from each other, and what `hold` does if so."""
+    a, b = work.contact[0], work.contact[1]
+    if a.status == STICKS and b.status == STICKS:
+        defined, _, twist = _both_stick(work, radius, free, EXACT)
+        return defined, twist
+    if a.status == STICKS:
+        a, b = b, a
+    if a.status != SLIPS or b.status == OPEN:
+        return False, free
+    n_a, n_b, first = vector(a.normal), vector(b.normal), _unit_impulse(a, 0)
+    opening = excess(a, free.linear)
+    if b.status == SLIPS:
+        second = _unit_impulse(b, 0)
+        ab, ba = dot(n_a, second), dot(n_b, first)
+        rest = 1.0 - ab * ba
+        if abs(rest) < _SINGULAR:
+            return False, free
+        other = excess(b, free.linear)
+        one = (ab * other - opening) / rest
+        impulse = scaled((ba * opening - other) / rest, second)
+    else:
+        # The point of contact of b is to move so, whatever the impulse at a.
+        wanted = plus(vector(b.surface), b.bias, n_b)
+        missed = sub(wanted, plus(free.linear, radius, cross(n_b, free.angular)))
+        alone = _impulse_for(n_b, missed)
+        effect = plus(first, -_SPIN_PER_IMPULSE, cross(n_b, cross(n_a, first)))
+        answer = _impulse_for(n_b, effect)
+        rest = 1.0 - dot(n_a, answer)
+        if abs(rest) < _SINGULAR:
+            return False, free
+        one = (-opening - dot(n_a, alone)) / rest
+        impulse = plus(alone, -one, answer)
+    _take(a, scaled(one, first))
+    _take(b, impulse)
+    twist = _apply(a, radius, free, a.push, vector(a.drag))
+    return True, _apply(b, radius, twist, b.push, vector(b.drag))
+
+
+@kernel
+def _impulse_for(n: Vector, change: Vector) -> Vector:
+    """Return the impulse that alone changes the velocity of its point of contact so."""
+    return plus(
+        scaled(1.0 / _SLIP_PER_IMPULSE, change),
+        _SPIN_PER_IMPULSE / _SLIP_PER_IMPULSE * dot(n, change),
+        n,
+    )
+
+
+@kernel
+def _take(contact: Record, impulse: Vector) -> None:
+    """Write an impulse as a contact's push and drag."""
+    n = vector(contact.normal)
+    contact.push = dot(n, impulse)
+    store(contact.drag, tangential(impulse, n))
+
+
+@kernel
+def _hold_several(work: Record, count: int, radius: float, free: Twist) -> Twist:
+    """Return what `_hold_known` does, from a system of linear equations.
+
+    Its unknowns are the impulse of a contact that sticks, three numbers, and the normal part of one
+    that slips; its equations that the velocity of the one's point, and the normal velocity of the
+    other, are what they should be.
+    """
+    size = 0
     for i in range(count):
-        c.active[i] = i
-    _respond(c, count)
-    _newton_step(c, count, radius, v, w, True)
-    return _sum(c, count, radius, v, w)
+        contact = work.contact[i]
+        contact.first = size
+        size += _unknowns(contact)
+    for i in range(count):
+        _write_equations(work, count, size, work.contact[i], radius, free)
+    eliminate(work.system, size, work.columns)
+    twist = free
+    for i in range(count):
+        contact = work.contact[i]
+        impulse = (0.0, 0.0, 0.0)
+        for b in range(_unknowns(contact)):
+            impulse = plus(impulse, work.system[contact.first + b, size], _unit_impulse(contact, b))
+        _take(contact, impulse)
+        twist = _apply(contact, radius, twist, contact.push, vector(contact.drag))
+    return twist
+
+
+@kernel
+def _write_equations(
+    work: Record, count: int, size: int, contact: Record, radius: float, free: Twist
+) -> None:
+    """Write the rows of a contact into the system of ``size`` unknowns."""
+    system, place, n = work.system, contact.first, vector(contact.normal)
+    if contact.status == OPEN:
+        return
+    if contact.status == STICKS:
+        wanted = plus(vector(contact.surface), contact.bias, n)
+        moving = plus(free.linear, radius, cross(n, free.angular))
+        for a in range(3):
+            system[place + a, size] = wanted[a] - moving[a]
+    else:
+        system[place, size] = -excess(contact, free.linear)
+    for j in range(count):
+        other = work.contact[j]
+        for b in range(_unknowns(other)):
+            impulse = _unit_impulse(other, b)
+            if contact.status == STICKS:
+                turned = cross(vector(other.normal), impulse)
+                effect = plus(impulse, -_SPIN_PER_IMPULSE, cross(n, turned))
+                for a in range(3):
+                    system[place + a, other.first + b] = effect[a]
+            else:
+                system[place, other.first + b] = dot(n, impulse)
+
+
+@kernel
+def _unknowns(contact: Record) -> int:
+    if contact.status == OPEN:
+        return 0
+    return 3 if contact.status == STICKS else 1
+
+
+@kernel
+def _unit_impulse(contact: Record, b: int) -> Vector:
+    """Return an axis of the world for a contact that sticks, and that of the cone for others."""
+    if contact.status == STICKS:
+        return 1.0 if b == 0 else 0.0, 1.0 if b == 1 else 0.0, 1.0 if b == 2 else 0.0
+    return plus(vector(contact.normal), -contact.friction, vector(contact.direction))
 
 
 @kernel
 def _polish(
-    c: Contacts, count: int, radius: float, free_v: Vector, free_w: Vector, scale: float
-) -> tuple[bool, Vector, Vector]:
+    work: Record, count: int, radius: float, free: Twist, scale: float
+) -> tuple[bool, Twist]:
     """Newton's method from the impulses there are, with the status that every contact has.
 
     Returns whether it ended at an answer, and the velocities. If not, the impulses are as before.
     """
     m = 0
     for i in range(count):
-        if c.status[i] != OPEN:
-            c.active[m] = i
+        contact = work.contact[i]
+        contact.kept_push = contact.push
+        store(contact.kept_drag, vector(contact.drag))
+        if contact.status != OPEN:
+            work.active[m] = i
             m += 1
-    kept_push, kept_drag = c.push[:count].copy(), c.drag[:count].copy()
-    _respond(c, m)
+    _respond(work, m)
     done = m == 0
     before = math.inf
     for _ in range(_MOST_NEWTON_STEPS):
         if m == 0:
             break
-        residual = _newton_step(c, m, radius, free_v, free_w, False)
+        residual = _newton_step(work, m, radius, free)
         if residual <= _ROUNDING * scale or (residual <= 1e-12 * scale and residual >= before):
             done = True
             break
         before = residual
-    v, w = _sum(c, count, radius, free_v, free_w)
-    if done and _satisfied(c, count, v, scale):
-        return True, v, w
-    c.push[:count] = kept_push
-    c.drag[:count] = kept_drag
-    return False, v, w
+    twist = _sum(work, count, radius, free)
+    if done and _satisfied(work, count, twist.linear, scale):
+        return True, twist
+    for i in range(count):
+        contact = work.contact[i]
+        contact.push = contact.kept_push
+        store(contact.drag, vector(contact.kept_drag))
+    return False, twist
 
 
 @kernel
-def _satisfied(c: Contacts, count: int, v: Vector, scale: float) -> bool:
-    """Say whether no contact pulls, closes or sticks beyond its cone."""
+def _kept(work: Record, count: int, radius: float, twist: Twist, scale: float) -> bool:
+    """Say whether contacts stay closed, and those that stick do: nothing rigid may give way."""
     room = 1e-12 * scale
     for i in range(count):
-        if c.push[i] < -room:
+        contact = work.contact[i]
+        if contact.status != OPEN and abs(excess(contact, twist.linear)) > room:
             return False
-        if c.status[i] == OPEN and excess(c, i, v) < -room:
-            return False
-        most = c.friction[i] * max(c.push[i], 0.0)
-        if c.status[i] == STICKS and norm(row(c.drag, i)) > most + room:
+        if contact.status == STICKS and norm(slip(contact, radius, twist)) > room:
             return False
     return True
 
 
 @kernel
-def _sum(c: Contacts, count: int, radius: float, v: Vector, w: Vector) -> tuple[Vector, Vector]:
-    """Return the velocities after all impulses."""
+def _satisfied(work: Record, count: int, v: Vector, scale: float) -> bool:
+    """Say whether no contact pulls, closes or sticks beyond its cone."""
+    room = 1e-12 * scale
     for i in range(count):
-        v, w = _apply(c, i, radius, v, w, c.push[i], row(c.drag, i))
-    return v, w
+        contact = work.contact[i]
+        if contact.push < -room:
+            return False
+        if contact.status == OPEN and excess(contact, v) < -room:
+            return False
+        most = contact.friction * max(contact.push, 0.0)
+        if contact.status == STICKS and norm(vector(contact.drag)) > most + room:
+            return False
+    return True
 
 
 @kernel
-def _respond(c: Contacts, m: int) -> None:
+def _sum(work: Record, count: int, radius: float, twist: Twist) -> Twist:
+    """Return the velocities after all impulses."""
+    for i in range(count):
+        contact = work.contact[i]
+        twist = _apply(contact, radius, twist, contact.push, vector(contact.drag))
+    return twist
+
+
+@kernel
+def _respond(work: Record, m: int) -> None:
     """Write the frames of the active contacts, and what unit impulses along them change (Delassus).
 
     Row and column 3 i are the normal of the i-th active contact, the next two its tangents.
     """
     for i in range(m):
-        n = row(c.normal, c.active[i])
+        n = vector(work.contact[work.active[i]].normal)
         # The axis along which the normal is shortest is not along it.
         x, y, z = abs(n[0]), abs(n[1]), abs(n[2])
         if x <= y and x <= z:
@@ -439,54 +576,50 @@ def _respond(c: Contacts, m: int) -> None:
             other = (0.0, 0.0, 1.0)
         first = cross(n, other)
         first = scaled(1.0 / norm(first), first)
-        put(c.frame, 3 * i, n)
-        put(c.frame, 3 * i + 1, first)
-        put(c.frame, 3 * i + 2, cross(n, first))
+        put(work.frame, 3 * i, n)
+        put(work.frame, 3 * i + 1, first)
+        put(work.frame, 3 * i + 2, cross(n, first))
     for j in range(m):
-        source = row(c.frame, 3 * j)
+        source = row(work.frame, 3 * j)
         for b in range(3):
-            impulse = row(c.frame, 3 * j + b)
+            impulse = row(work.frame, 3 * j + b)
             turned = cross(source, impulse)
             for i in range(m):
-                n = row(c.frame, 3 * i)
+                n = row(work.frame, 3 * i)
                 moved = plus(impulse, -_SPIN_PER_IMPULSE, cross(n, turned))
                 for a in range(3):
                     effect = impulse if a == 0 else moved
-                    c.response[3 * i + a, 3 * j + b] = dot(row(c.frame, 3 * i + a), effect)
+                    work.response[3 * i + a, 3 * j + b] = dot(row(work.frame, 3 * i + a), effect)
 
 
 @kernel
-def _newton_step(
-    c: Contacts, m: int, radius: float, free_v: Vector, free_w: Vector, known: bool
-) -> float:
+def _newton_step(work: Record, m: int, radius: float, free: Twist) -> float:
     """Change the impulses of the ``m`` active contacts by one Newton step; return the residual.
 
     Args:
-        c: the contacts.
+        work: the contacts.
         m: how many are active.
         radius: of the ball.
-        free_v: velocity without contacts.
-        free_w: angular velocity without contacts.
-        known: the direction of every slip is known, so that the step is exact.
+        free: velocities without contacts.
     """
-    v, w = free_v, free_w
+    twist = free
     for i in range(m):
-        contact = c.active[i]
-        v, w = _apply(c, contact, radius, v, w, c.push[contact], row(c.drag, contact))
+        contact = work.contact[work.active[i]]
+        twist = _apply(contact, radius, twist, contact.push, vector(contact.drag))
     size = 3 * m
     residual = 0.0
-    system, response = c.system, c.response
+    system, response = work.system, work.response
     for i in range(m):
-        contact = c.active[i]
-        first, second = row(c.frame, 3 * i + 1), row(c.frame, 3 * i + 2)
-        u = slip(c, contact, radius, v, w)
+        contact = work.contact[work.active[i]]
+        first, second = row(work.frame, 3 * i + 1), row(work.frame, 3 * i + 2)
+        u = slip(contact, radius, twist)
         u1, u2 = dot(u, first), dot(u, second)
-        opening = excess(c, contact, v)
+        opening = excess(contact, twist.linear)
         residual = max(residual, abs(opening))
         for k in range(size):
             system[3 * i, k] = response[3 * i, k]
         system[3 * i, size] = -opening
-        if c.status[contact] == STICKS:
+        if contact.status == STICKS:
             residual = max(residual, abs(u1), abs(u2))
             for k in range(size):
                 system[3 * i + 1, k] = response[3 * i + 1, k]
@@ -494,11 +627,11 @@ def _newton_step(
             system[3 * i + 1, size] = -u1
             system[3 * i + 2, size] = -u2
             continue
-        mu, push, drag = c.friction[contact], c.push[contact], row(c.drag, contact)
-        speed = math.hypot(u1, u2)
+        mu, push, drag = contact.friction, contact.push, vector(contact.drag)
+        speed = _length(u1, u2)
         stiffness = 0.0
-        if known or c.slides[contact]:
-            d = row(c.direction, contact)
+        if contact.slides:
+            d = vector(contact.direction)
             d1, d2 = dot(d, first), dot(d, second)
         elif speed > 0.0:
             d1, d2 = u1 / speed, u2 / speed
@@ -519,71 +652,11 @@ def _newton_step(
         system[3 * i + 2, 3 * i + 2] += 1.0
         system[3 * i + 1, size] = -r1
         system[3 * i + 2, size] = -r2
-    _eliminate(system, size, c.columns)
+    eliminate(system, size, work.columns)
     for i in range(m):
-        contact = c.active[i]
-        c.push[contact] += system[3 * i, size]
-        drag = row(c.drag, contact)
-        drag = plus(drag, system[3 * i + 1, size], row(c.frame, 3 * i + 1))
-        put(c.drag, contact, plus(drag, system[3 * i + 2, size], row(c.frame, 3 * i + 2)))
+        contact = work.contact[work.active[i]]
+        contact.push += system[3 * i, size]
+        drag = vector(contact.drag)
+        drag = plus(drag, system[3 * i + 1, size], row(work.frame, 3 * i + 1))
+        store(contact.drag, plus(drag, system[3 * i + 2, size], row(work.frame, 3 * i + 2)))
     return residual
-
-
-@kernel
-def _eliminate(system: Any, size: int, columns: Any) -> None:
-    """Solve a linear system by elimination with complete pivoting; the answer is the last column.
-
-    Where it is singular, as for friction that is indeterminate, the unknowns that nothing decides
-    are 0.
-    """
-    for i in range(size):
-        columns[i] = i
-        largest = np.abs(system[i, :size]).max()
-        if largest > 0.0:
-            system[i, : size + 1] /= largest
-    rank = size
-    for step in range(size):
-        if not _pivot(system, size, step, columns):
-            rank = step
-            break
-        _clear_column(system, size, step)
-    system[rank:size, size] = 0.0
-    for step in range(rank - 1, -1, -1):
-        value = system[step, size]
-        for k in range(step + 1, rank):
-            value -= system[step, k] * system[k, size]
-        system[step, size] = value / system[step, step]
-    # The first column's memory is free now: put the answer back into the unknowns' own order.
-    for step in range(size):
-        system[columns[step], 0] = system[step, size]
-    system[:size, size] = system[:size, 0]
-
-
-@kernel
-def _clear_column(system: Any, size: int, step: int) -> None:
-    """Take the pivot's row away from those below it."""
-    for i in range(step + 1, size):
-        factor = system[i, step] / system[step, step]
-        if factor != 0.0:
-            for k in range(step + 1, size + 1):
-                system[i, k] -= factor * system[step, k]
-
-
-@kernel
-def _pivot(system: Any, size: int, step: int, columns: Any) -> bool:
-    """Bring the largest number that is left to the diagonal; say whether it is more than 0."""
-    best, pivot_row, pivot_column = 0.0, step, step
-    for i in range(step, size):
-        for k in range(step, size):
-            if abs(system[i, k]) > best:
-                best, pivot_row, pivot_column = abs(system[i, k]), i, k
-    if best < _SINGULAR:
-        return False
-    if pivot_row != step:
-        for k in range(size + 1):
-            system[step, k], system[pivot_row, k] = system[pivot_row, k], system[step, k]
-    if pivot_column != step:
-        for i in range(size):
-            system[i, step], system[i, pivot_column] = system[i, pivot_column], system[i, step]
-        columns[step], columns[pivot_column] = columns[pivot_column], columns[step]
-    return True

@@ -13,8 +13,14 @@ import math
 from typing import Final
 
 from roller_env.physics.rigid.closest import FACE, closest
-from roller_env.physics.rigid.kernels import Vector, dot, first_root, kernel, plus
-from roller_env.physics.rigid.scene import Scene
+from roller_env.physics.rigid.kernels import (
+    Record,
+    Vector,
+    dot,
+    first_root,
+    kernel,
+    position_at,
+)
 
 CONTACT_GAP_M: Final = 1e-9
 """A ball this near to a solid touches it. Held balls are kept at half of it."""
@@ -24,15 +30,9 @@ _MOST_HALVINGS: Final = 48
 
 
 @kernel
-def position_at(start: Vector, velocity: Vector, acceleration: Vector, time: float) -> Vector:
-    """Return where a parabola is at ``time``."""
-    return plus(plus(start, time, velocity), 0.5 * time * time, acceleration)
-
-
-@kernel
 def impact_time(
-    scene: Scene,
-    box: int,
+    solid: Record,
+    radius: float,
     from_centre: Vector,
     velocity: Vector,
     acceleration: Vector,
@@ -44,8 +44,8 @@ def impact_time(
     """Return the first time in [0, ``before``) at which the ball touches a box, or ``inf``.
 
     Args:
-        scene: the solids.
-        box: which.
+        solid: the box.
+        radius: of the ball, metres.
         from_centre: the ball's centre relative to the box's, world axes, metres.
         velocity: relative to the box, m/s.
         acceleration: likewise, m/s^2.
@@ -59,12 +59,12 @@ def impact_time(
     if gap <= CONTACT_GAP_M and kind != FACE:
         # A round feature's plane is met again at once by a ball that rolls off it, the feature
         # itself is not: begin where the ball is seen to be free.
-        time = _time_when_free(scene, box, from_centre, velocity, acceleration, before)
+        time = _time_when_free(solid, radius, from_centre, velocity, acceleration, before)
         if time >= before:
             return math.inf
         there = position_at(from_centre, velocity, acceleration, time)
-        distance, normal, _, _ = closest(scene, box, there)
-        gap = max(distance - scene.radius, 0.5 * CONTACT_GAP_M)
+        distance, normal, _, _ = closest(solid, there)
+        gap = max(distance - radius, 0.5 * CONTACT_GAP_M)
     for _ in range(_MOST_PLANES):
         approach = dot(normal, velocity) + time * dot(normal, acceleration)
         curve = 0.5 * dot(normal, acceleration)
@@ -72,8 +72,8 @@ def impact_time(
         if time >= before:
             return math.inf
         there = position_at(from_centre, velocity, acceleration, time)
-        distance, normal, _, _ = closest(scene, box, there)
-        gap = distance - scene.radius
+        distance, normal, _, _ = closest(solid, there)
+        gap = distance - radius
         if gap <= 0.5 * CONTACT_GAP_M:
             return time
     return time
@@ -81,8 +81,8 @@ def impact_time(
 
 @kernel
 def _time_when_free(
-    scene: Scene,
-    box: int,
+    solid: Record,
+    radius: float,
     from_centre: Vector,
     velocity: Vector,
     acceleration: Vector,
@@ -92,8 +92,8 @@ def _time_when_free(
     time = before
     for _ in range(_MOST_HALVINGS):
         there = position_at(from_centre, velocity, acceleration, time)
-        distance, _, _, _ = closest(scene, box, there)
-        if distance - scene.radius >= 0.0:
+        distance, _, _, _ = closest(solid, there)
+        if distance - radius >= 0.0:
             break
         time *= 0.5
     return time

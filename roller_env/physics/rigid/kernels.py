@@ -3,13 +3,39 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
-from roller_env.compiled import compiled_with_package as kernel
+import numpy as np
+import numpy.typing as npt
 
-__all__ = ["kernel"]
+from roller_env.compiled import compiled_with_package as entry
+from roller_env.compiled import inlined
+from roller_env.compiled import part as kernel
+
+__all__ = ["entry", "inlined", "kernel"]
 
 Vector = tuple[float, float, float]
+
+Record = Any
+"""One record of a structured array; compiled code sees a pointer."""
+
+Records = npt.NDArray[np.void]
+"""A structured array. Its fields are attributes, also in plain Python if it is a `np.recarray`."""
+
+
+class Twist(NamedTuple):
+    """How a rigid body moves, or how that changes: velocities, or accelerations. World frame."""
+
+    linear: Vector  # of the centre
+    angular: Vector
+
+
+class Ball(NamedTuple):
+    """A ball as kernels carry it along, but for its orientation. SI units, world frame."""
+
+    position: Vector
+    velocity: Vector
+    spin: Vector  # angular velocity
 
 
 @kernel
@@ -56,6 +82,26 @@ def plus(a: Vector, factor: float, b: Vector) -> Vector:
 def tangential(a: Vector, normal: Vector) -> Vector:
     """Return the part of ``a`` at right angles to the unit vector ``normal``."""
     return plus(a, -dot(a, normal), normal)
+
+
+@kernel
+def position_at(start: Vector, velocity: Vector, acceleration: Vector, time: float) -> Vector:
+    """Return where a parabola is at ``time``."""
+    return plus(plus(start, time, velocity), 0.5 * time * time, acceleration)
+
+
+@kernel
+def vector(field: Any) -> Vector:
+    """Return an array of three numbers."""
+    return field[0], field[1], field[2]
+
+
+@kernel
+def store(field: Any, a: Vector) -> None:
+    """Write a vector into an array of three numbers."""
+    field[0] = a[0]
+    field[1] = a[1]
+    field[2] = a[2]
 
 
 @kernel

@@ -23,6 +23,7 @@ SLIP_SHARE: Final = 2.0 / 7.0
 """Of a change of the slip, what the centre's velocity takes of it (the spin takes 5/7)."""
 
 _MOST_ITERATIONS: Final = 100
+_LAST_CHANGE: Final = 1e-9
 
 
 @kernel
@@ -65,7 +66,10 @@ def slide(
     Returns:
         The slip along the push and at right angles to it, m/s; the way along both, metres.
     """
-    c2, s2 = 0.5 * (1.0 + cos_angle), 0.5 * (1.0 - cos_angle)
+    # Of the two squares the smaller would drown in rounding.
+    more = 0.5 * (1.0 + abs(cos_angle))
+    less = 0.25 * sin_angle * sin_angle / more
+    c2, s2 = (more, less) if cos_angle > 0.0 else (less, more)
     two_cs = sin_angle
     x = _parameter(slip, push, c2, s2, k, time)
     along = slip * (c2 * math.exp((push - k) * x) - s2 * math.exp(-(push + k) * x))
@@ -84,19 +88,25 @@ def slide(
 def _parameter(slip: float, push: float, c2: float, s2: float, k: float, time: float) -> float:
     """Return X at ``time``: Newton's iteration, held between bounds that close in on it."""
     low, high = 0.0, math.inf
-    # The slip shrinks at least at the rate k - g and at most at k + g.
     x = time / slip
+    if push > k and c2 > 0.0:
+        # The part of the slip that grows would alone take this long.
+        high = math.log1p((push - k) * time / (slip * c2)) / (push - k) * (1.0 + 1e-12)
+        x = min(x, high)
     for _ in range(_MOST_ITERATIONS):
-        excess = slip * (c2 * _integral(k - push, x) + s2 * _integral(k + push, x)) - time
+        slow, fast = _integral(k - push, x), _integral(k + push, x)
+        excess = slip * (c2 * slow + s2 * fast) - time
         if excess > 0.0:
             high = x
         else:
             low = x
-        rate = slip * (c2 * math.exp((push - k) * x) + s2 * math.exp(-(push + k) * x))
+        # Of an exponential and its integral one says the other.
+        rate = slip * (c2 * (1.0 - (k - push) * slow) + s2 * (1.0 - (k + push) * fast))
         following = x - excess / rate if rate > 0.0 else math.inf
         if not low <= following <= high:
             following = 0.5 * (low + high) if high < math.inf else 2.0 * x + 1.0 / k
-        if abs(following - x) <= 1e-16 * abs(x) or following == x:
+        # What is left is about the square of the last change.
+        if abs(following - x) <= _LAST_CHANGE * x:
             return following
         x = following
     return x

@@ -26,10 +26,10 @@ KEY = 5.08
 
 def test_a_pushed_ball_rolls_with_five_sevenths_of_the_push() -> None:
     world = World([floor()]).put((0.0, 0.0, RESTING_M)).run(5.0, (KEY, 0.0, 0.0))
-    assert world.balls.position[0] == pytest.approx(
+    assert world.states.position[0] == pytest.approx(
         [0.5 * KEY / 1.4 * 5.0**2, 0.0, RESTING_M], abs=NANOMETRE
     )
-    assert world.balls.angular_velocity[0, 1] * RADIUS_M == pytest.approx(KEY / 1.4 * 5.0)
+    assert world.angular_velocity[0, 1] * RADIUS_M == pytest.approx(KEY / 1.4 * 5.0)
 
 
 @pytest.mark.parametrize("degrees", [5.0, 20.0, 40.0])
@@ -39,7 +39,7 @@ def test_a_ball_rolls_down_a_slope_or_slides_where_it_is_steep(degrees: float) -
     world = World([slope(degrees)]).put(tuple(normal * RESTING_M)).run(2.0)
     rolls = 5.0 / 7.0 * GRAVITY * math.sin(angle)
     slides = GRAVITY * (math.sin(angle) - FRICTION * math.cos(angle))
-    way = np.linalg.norm(world.balls.position[0] - normal * RESTING_M)
+    way = np.linalg.norm(world.states.position[0] - normal * RESTING_M)
     assert way == pytest.approx(0.5 * max(rolls, slides) * 2.0**2, abs=NANOMETRE)
 
 
@@ -47,8 +47,8 @@ def test_a_skidding_ball_rolls_after_two_sevenths_of_its_speed_over_friction() -
     world = World([floor()]).put((0.0, 0.0, RESTING_M), (4.0, 0.0, 0.0)).run(2.0)
     end = 2.0 * 4.0 / (7.0 * FRICTION * GRAVITY)
     way = 4.0 * end - 0.5 * FRICTION * GRAVITY * end**2 + 5.0 / 7.0 * 4.0 * (2.0 - end)
-    assert world.balls.position[0, 0] == pytest.approx(way, abs=NANOMETRE)
-    assert world.balls.velocity[0, 0] == pytest.approx(5.0 / 7.0 * 4.0, abs=NANOMETRE)
+    assert world.states.position[0, 0] == pytest.approx(way, abs=NANOMETRE)
+    assert world.states.velocity[0, 0] == pytest.approx(5.0 / 7.0 * 4.0, abs=NANOMETRE)
 
 
 def test_a_skid_across_a_push_turns_as_the_equations_say() -> None:
@@ -64,9 +64,9 @@ def test_a_skid_across_a_push_turns_as_the_equations_say() -> None:
 
     start = [0.0, 0.0, 4.0, 1.0, 3.0, 1.0]
     end = solve_ivp(rates, (0.0, 0.3), start, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
-    assert world.balls.position[0, :2] == pytest.approx(end[:2], abs=1e-12)
-    assert world.balls.velocity[0, :2] == pytest.approx(end[2:4], abs=1e-12)
-    assert world.balls.angular_velocity[0] == pytest.approx([*end[4:], 2.0], abs=1e-11)
+    assert world.states.position[0, :2] == pytest.approx(end[:2], abs=1e-12)
+    assert world.states.velocity[0, :2] == pytest.approx(end[2:4], abs=1e-12)
+    assert world.angular_velocity[0] == pytest.approx([*end[4:], 2.0], abs=1e-11)
 
 
 def test_a_plastic_ball_that_falls_46_metres_stays_on_the_ground() -> None:
@@ -74,7 +74,7 @@ def test_a_plastic_ball_that_falls_46_metres_stays_on_the_ground() -> None:
     fall = math.sqrt(2.0 * 46.0 / GRAVITY)
     # It rolls on with 5/7 of its speed: the impact has friction enough to stop the slip at once.
     x = fall + 5.0 / 7.0 * (6.0 - fall)
-    assert world.balls.position[0] == pytest.approx([x, 0.0, RESTING_M], abs=2.0 * NANOMETRE)
+    assert world.states.position[0] == pytest.approx([x, 0.0, RESTING_M], abs=2.0 * NANOMETRE)
     assert world.counts.forced[0] == world.counts.unsolved[0] == 0
 
 
@@ -86,15 +86,15 @@ def test_a_ball_bounces_back_with_the_elasticity_of_its_speed(elasticity: float)
         time, speed = time + 2.0 * speed / GRAVITY, speed * elasticity
     left = 2.0 - time
     height = max(speed * left - 0.5 * GRAVITY * left**2, 0.0) if speed > 1e-3 else 0.0
-    assert world.balls.position[0, 2] - RADIUS_M == pytest.approx(height, abs=3.0 * NANOMETRE)
+    assert world.states.position[0, 2] - RADIUS_M == pytest.approx(height, abs=3.0 * NANOMETRE)
 
 
 def test_an_elastic_ball_thrown_at_45_degrees_leaves_rolling() -> None:
     # Coulomb's friction with tangential restitution 0: the impulse is enough to end the slip.
     world = World([floor(elasticity=0.8)]).put((0.0, 0.0, RADIUS_M + 1e-3), (4.0, 0.0, -4.0))
     world.step()
-    assert world.balls.velocity[0, 0] == pytest.approx(20.0 / 7.0, abs=1e-12)
-    assert world.balls.angular_velocity[0, 1] * RADIUS_M == pytest.approx(20.0 / 7.0, abs=1e-12)
+    assert world.states.velocity[0, 0] == pytest.approx(20.0 / 7.0, abs=1e-12)
+    assert world.angular_velocity[0, 1] * RADIUS_M == pytest.approx(20.0 / 7.0, abs=1e-12)
 
 
 def test_a_plastic_ball_thrown_flat_onto_the_ground_does_not_rise() -> None:
@@ -107,7 +107,7 @@ def test_a_ball_pressed_into_a_wall_rolls_along_it_on_both(friction: float) -> N
     wall = SolidBox((0.0, 1.0 + RADIUS_M, 0.0), (500.0, 1.0, 5.0), friction=friction)
     world = World([floor(friction=friction), wall]).put((0.0, 0.0, RESTING_M))
     world.run(1.0, (KEY, KEY, 0.0))
-    assert world.balls.position[0, 0] == pytest.approx(0.5 * KEY / 1.8, abs=NANOMETRE)
+    assert world.states.position[0, 0] == pytest.approx(0.5 * KEY / 1.8, abs=NANOMETRE)
 
 
 def test_a_ball_that_rolls_into_a_wall_climbs_it_with_two_sevenths_of_its_speed() -> None:

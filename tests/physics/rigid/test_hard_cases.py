@@ -22,14 +22,14 @@ def test_a_ball_does_not_feel_the_seams_of_a_floor_of_tiles(speed: float) -> Non
     spin = (0.0, speed / RADIUS_M, 0.0)
     world = World(tiles).put((0.0, 0.013, RESTING_M), (speed, 0.0, 0.0), spin).run(1.0)
     assert world.path[0, :, 2] == pytest.approx(RESTING_M, abs=NANOMETRE)
-    assert world.balls.velocity[0] == pytest.approx([speed, 0.0, 0.0], abs=1e-9)
+    assert world.states.velocity[0] == pytest.approx([speed, 0.0, 0.0], abs=1e-9)
 
 
 @pytest.mark.parametrize("speed", [20.0, 200.0, 1000.0])
 def test_nothing_goes_through_a_millimetre_of_wall(speed: float) -> None:
     wall = SolidBox((10.0, 0.0, 0.0), (0.0005, 500.0, 500.0))
     world = World([wall]).put((0.0, 0.0, 0.0), (speed, 0.0, 0.0)).run(0.6)
-    assert world.balls.position[0, 0] <= 10.0 - 0.0005 - RADIUS_M
+    assert world.states.position[0, 0] <= 10.0 - 0.0005 - RADIUS_M
 
 
 @pytest.mark.parametrize("y", [0.0, 0.1, 0.35])
@@ -49,25 +49,25 @@ def test_a_ball_at_rest_in_a_corner_of_three_stays() -> None:
         SolidBox((0.0, 1.0 + RADIUS_M, 0.0), (5.0, 1.0, 5.0)),
     ]
     world = World([floor(), *walls]).put((0.0, 0.0, RESTING_M)).run(1.0, (5.08, 5.08, 0.0))
-    assert world.balls.position[0] == pytest.approx([0.0, 0.0, RADIUS_M], abs=2.0 * NANOMETRE)
-    assert np.abs(world.balls.velocity).max() < 1e-9
+    assert world.states.position[0] == pytest.approx([0.0, 0.0, RADIUS_M], abs=2.0 * NANOMETRE)
+    assert np.abs(world.states.velocity).max() < 1e-9
 
 
 def test_a_plate_carries_the_ball_down_and_stops_with_it() -> None:
     plate = SolidBox((0.0, 0.0, -0.5), (2.0, 2.0, 0.5), slab=0)
     world = World([plate], slab_stop=[-0.1]).put((0.3, 0.0, RESTING_M))
-    world.slab_speed[:] = -0.0406
+    world.commands.slab_velocity[:] = -0.0406
     world.run(4.0)
-    assert world.balls.slab[0, 0] == -0.1
-    assert world.balls.position[0] == pytest.approx([0.3, 0.0, RESTING_M - 0.1], abs=2 * NANOMETRE)
+    assert world.states.slab[0, 0] == -0.1
+    assert world.states.position[0] == pytest.approx([0.3, 0.0, RESTING_M - 0.1], abs=2 * NANOMETRE)
 
 
 def test_a_gate_that_comes_down_on_the_ball_is_held_up_by_it() -> None:
     gate = SolidBox((0.0, 0.0, 2.0), (1.0, 1.0, 1.0), slab=0)
     world = World([floor(), gate], slab_stop=[-1.0]).put((0.2, 0.1, RESTING_M))
-    world.slab_speed[:] = -0.8
+    world.commands.slab_velocity[:] = -0.8
     world.run(2.0)
-    assert world.balls.slab[0, 0] == pytest.approx(2.0 * RADIUS_M - 1.0, abs=1e-6)
+    assert world.states.slab[0, 0] == pytest.approx(2.0 * RADIUS_M - 1.0, abs=1e-6)
     assert world.depth()[0] < 1e-7
     assert world.counts.blocked[0] > 0
 
@@ -83,8 +83,8 @@ def test_balls_among_many_turned_boxes_stay_outside_and_gain_no_energy() -> None
         for _ in range(60)
     ]
     world = World([*boxes, SolidBox((0.0, 0.0, -5.0), (9.0, 9.0, 0.5))], 32)
-    world.balls.position[:] = [0.0, 0.0, 5.0]
-    world.balls.position[:, :2] += generator.uniform(-2.5, 2.5, (32, 2))
+    world.states.position[:] = [0.0, 0.0, 5.0]
+    world.states.position[:, :2] += generator.uniform(-2.5, 2.5, (32, 2))
     for _ in range(60):
         before = world.energy()
         world.step()
@@ -99,18 +99,18 @@ def test_the_bits_are_the_same_for_any_split_of_the_balls() -> None:
     starts = generator.uniform([-1.0, -1.0, 0.6], [1.0, 1.0, 2.0], (6, 3))
     speeds = generator.normal(0.0, 4.0, (6, 3))
     whole = World([floor(elasticity=0.5), wall], 6)
-    whole.balls.position[:], whole.balls.velocity[:] = starts, speeds
+    whole.states.position[:], whole.states.velocity[:] = starts, speeds
     whole.run(2.0, (3.0, 1.0, 0.0))
     for ball in range(6):
         alone = World([floor(elasticity=0.5), wall])
         alone.put(tuple(starts[ball]), tuple(speeds[ball])).run(2.0, (3.0, 1.0, 0.0))
-        assert alone.balls.position[0].tobytes() == whole.balls.position[ball].tobytes()
-        assert alone.balls.attitude[0].tobytes() == whole.balls.attitude[ball].tobytes()
+        assert alone.states.position[0].tobytes() == whole.states.position[ball].tobytes()
+        assert alone.states.orientation[0].tobytes() == whole.states.orientation[ball].tobytes()
 
 
 def test_a_falling_ball_turns_about_its_axis_by_its_speed() -> None:
     world = World([floor()]).put((0.0, 0.0, 500.0), angular_velocity=(0.0, 0.0, 3.0)).run(1.0)
-    assert world.balls.attitude[0] == pytest.approx(
+    assert world.states.orientation[0] == pytest.approx(
         [math.cos(1.5), 0.0, 0.0, math.sin(1.5)], abs=1e-12
     )
-    assert world.balls.position[0, 2] == pytest.approx(500.0 - 0.5 * GRAVITY)
+    assert world.states.position[0, 2] == pytest.approx(500.0 - 0.5 * GRAVITY)

@@ -8,9 +8,12 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
-from roller_env.physics.rigid.engine import Balls, Counts, advance
-from roller_env.physics.rigid.scene import Scene, SolidBox, make_scene
+from roller_env.physics.rigid.scene import RigidLevel, Scenes, SolidBox, pack
+from roller_env.physics.rigid.states import make_commands, make_counts, make_states
+from roller_env.physics.rigid.step import advance
+from roller_env.physics.rigid.workspace import make_workspace
 
 Float64 = npt.NDArray[np.float64]
 
@@ -38,15 +41,14 @@ def slope(degrees: float) -> SolidBox:
 
 
 class World:
-    """N balls in one scene, at rest at the origin until they are put somewhere.
+    """N balls of 1 kg in one scene, at rest at the origin until they are put somewhere.
 
     Attributes:
-        scene: what they meet.
-        balls: where they are.
+        scenes: what they meet.
+        states: where they are.
+        commands: the force on each, and the slabs' velocities.
         path: (N, S + 1, 3) centres of the last step.
         counts: what the steps took.
-        force: (N, 3) force over mass besides gravity, m/s^2.
-        slab_speed: (N, P) along z, m/s.
     """
 
     def __init__(
@@ -58,20 +60,16 @@ class World:
         cap_s: float = CAP_S,
         samples: int = 12,
     ):
-        self.scene: Scene = make_scene(boxes, RADIUS_M, GRAVITY, slab_stop)
-        slabs = len(slab_stop)
-        self.balls = Balls(
-            position=np.zeros((count, 3)),
-            velocity=np.zeros((count, 3)),
-            angular_velocity=np.zeros((count, 3)),
-            attitude=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-            slab=np.zeros((count, slabs)),
-        )
+        level = RigidLevel(boxes, RADIUS_M, GRAVITY, slab_stop=slab_stop)
+        self.scenes: Scenes = pack([level])
+        self.states = make_states(self.scenes, count)
+        self.commands = make_commands(self.scenes, count)
+        self.counts = make_counts(count)
         self.path = np.zeros((count, samples + 1, 3))
-        self.counts = Counts(*(np.zeros(count, dtype=np.int64) for _ in Counts._fields))
-        self.force = np.zeros((count, 3))
-        self.slab_speed = np.zeros((count, slabs))
         self.cap_s = cap_s
+        self._workspace = make_workspace(self.scenes)
+        self._level_of_row = np.zeros(count, dtype=np.int64)
+        self._rows = np.arange(count)
 
     def put(
         self,
@@ -80,15 +78,16 @@ class World:
         angular_velocity: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> World:
         """Put all balls somewhere; return this."""
-        self.balls.position[:] = position
-        self.balls.velocity[:] = velocity
-        self.balls.angular_velocity[:] = angular_velocity
+        self.states.position[:] = position
+        self.states.velocity[:] = velocity
+        # The ball's frame, in which the spin is, is still the world's.
+        self.states.spin[:] = angular_velocity
         return self
 
     def run(self, time_s: float, force: Sequence[float] | None = None) -> World:
         """Let time pass in control steps; return this."""
         if force is not None:
-            self.force[:] = force
+            self.commands.force[:] = force
         for _ in range(round(time_s / STEP_S)):
             self.step()
         return self
@@ -96,34 +95,46 @@ class World:
     def step(self) -> None:
         """Let one control step pass."""
         advance(
-            self.scene,
-            self.balls,
-            self.force,
-            self.slab_speed,
+            self.scenes,
+            self._level_of_row,
+            self.states,
+            self.commands,
+            self._rows,
             STEP_S,
             self.cap_s,
-            0,
-            len(self.balls.position),
             self.path,
             self.counts,
+            self._workspace,
+            0,
         )
+
+    @property
+    def angular_velocity(self) -> Float64:
+        """(N, 3) rad/s, world frame."""
+        turned: Float64 = np.array(
+            [
+                Rotation.from_quat(quaternion, scalar_first=True).apply(spin)
+                for quaternion, spin in zip(self.states.orientation, self.states.spin, strict=True)
+            ]
+        )
+        return turned
 
     def energy(self) -> Float64:
         """Return (N,) kinetic and potential energy over mass, J/kg."""
-        v, w = self.balls.velocity, self.balls.angular_velocity
+        v, w = self.states.velocity, self.states.spin
         kinetic = 0.5 * (v**2).sum(axis=1) + 0.2 * RADIUS_M**2 * (w**2).sum(axis=1)
-        energy: Float64 = kinetic + GRAVITY * self.balls.position[:, 2]
+        energy: Float64 = kinetic + GRAVITY * self.states.position[:, 2]
         return energy
 
     def depth(self) -> Float64:
         """Return (N,) how deep each ball is in a solid, metres; negative where it is free."""
-        deepest = np.full(len(self.balls.position), -np.inf)
-        for box in range(len(self.scene.centre)):
-            relative = self.balls.position - self.scene.centre[box]
-            if self.scene.slab[box] >= 0:
-                relative[:, 2] -= self.balls.slab[:, self.scene.slab[box]]
-            local = relative @ self.scene.axes[box].T
-            half = self.scene.half[box]
+        deepest = np.full(len(self.states.position), -np.inf)
+        for solid in self.scenes.solid:
+            relative = self.states.position - solid.centre
+            if solid.slab >= 0:
+                relative[:, 2] -= self.states.slab[:, solid.slab]
+            local = relative @ solid.axes.T
+            half = solid.half
             outside = np.linalg.norm(np.maximum(np.abs(local) - half, 0.0), axis=1)
             inside = np.minimum((half - np.abs(local)).min(axis=1), np.inf)
             distance = np.where(outside > 0.0, outside, -inside)

@@ -1,0 +1,149 @@
+"""Impacts: what approaches is stopped or thrown back, all contacts at once."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from roller_env.physics.rigid.coulomb import EXACT, slip_over, solve
+from roller_env.physics.rigid.kernels import (
+    Record,
+    Records,
+    Twist,
+    Vector,
+    cross,
+    dot,
+    inlined,
+    kernel,
+    norm,
+    plus,
+    store,
+    vector,
+)
+from roller_env.physics.rigid.sliding import SLIP_SHARE
+from roller_env.physics.rigid.workspace import swap
+
+CLOSED_M_S: Final = 1e-6
+"""A contact whose normal velocity is less is held; it neither bounces nor opens."""
+
+CHATTER_M_S: Final = 1e-3
+"""The same where several contacts touch. Friction at one lifts the ball off another, and a ball
+that comes to rest in a corner would do so through ever smaller hops without end."""
+
+REST_M_S: Final = 1e-3
+"""An impact slower than this is plastic, whatever the elasticity: the bounces end."""
+
+STICK_M_S: Final = 1e-9
+"""A slip slower than this has ended."""
+
+_MOST_PROJECTIONS: Final = 50
+
+
+@kernel
+def velocity_over(contact: Record, v: Vector) -> Vector:
+    """Return a velocity relative to a contact's solid."""
+    return v[0], v[1], v[2] - contact.rise
+
+
+@kernel
+def opening(contact: Record, v: Vector) -> float:
+    """Return how fast a contact opens, m/s; negative where it closes."""
+    return dot(vector(contact.normal), velocity_over(contact, v))
+
+
+@kernel
+def true_slip(contact: Record, radius: float, twist: Twist) -> Vector:
+    """Return the velocity of the ball's point of contact over the solid, m/s."""
+    return slip_over(vector(contact.normal), (0.0, 0.0, contact.rise), radius, twist)
+
+
+@kernel
+def calmed(before: Twist, after: Twist, radius: float) -> Twist:
+    """Return velocities that are no answer, or none if they would have gained energy."""
+    inertia = 0.4 * radius * radius
+    was = dot(before.linear, before.linear) + inertia * dot(before.angular, before.angular)
+    is_now = dot(after.linear, after.linear) + inertia * dot(after.angular, after.angular)
+    if is_now <= was:
+        return after
+    return Twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+@kernel
+def closed_m_s(count: int) -> float:
+    """Return the normal velocity below which one of ``count`` contacts is held."""
+    return CLOSED_M_S if count == 1 else CHATTER_M_S
+
+
+@inlined
+def collide(
+    work: Record, slabs: Records, solids: Records, count: int, radius: float, twist: Twist
+) -> tuple[Twist, bool, int]:
+    """Return the velocities after the impacts, success, and how many slabs were held up.
+
+    A moving slab that would have to pass through the ball stands still for the rest of the step:
+    what squeezes a rigid ball against something rigid is held up by it.
+    """
+    approaches = False
+    for i in range(count):
+        approaches = approaches or opening(work.contact[i], twist.linear) < -closed_m_s(count)
+    if not approaches:
+        return twist, True, 0
+    fastest, moving = norm(twist.linear) + radius * norm(twist.angular), False
+    for i in range(count):
+        contact = work.contact[i]
+        store(contact.surface, (0.0, 0.0, contact.rise))
+        contact.slides = 0
+        approach = opening(contact, twist.linear)
+        contact.bias = -contact.elasticity * approach if approach < -REST_M_S else 0.0
+        moving = moving or contact.rise != 0.0
+        fastest = max(fastest, abs(contact.rise))
+    after, solved = solve(work, count, radius, twist, EXACT)
+    blocked = 0
+    if moving and (not solved or norm(after.linear) > 4.0 * fastest + 1.0):
+        for i in range(count):
+            contact = work.contact[i]
+            number = solids[contact.solid].slab
+            if number >= 0 and slabs[number].speed != 0.0:
+                slabs[number].speed = 0.0
+                blocked += 1
+            contact.rise, contact.bias = 0.0, 0.0
+            store(contact.surface, (0.0, 0.0, 0.0))
+        after, solved = solve(work, count, radius, twist, EXACT)
+    if not solved:
+        after = calmed(twist, after, radius)
+    return after, solved, blocked
+
+
+@inlined
+def keep_closed(work: Record, count: int, v: Vector) -> int:
+    """Leave out contacts that open; return how many are left."""
+    fastest = closed_m_s(count)
+    i = 0
+    while i < count:
+        if opening(work.contact[i], v) > fastest:
+            count -= 1
+            swap(work, i, count)
+        else:
+            i += 1
+    return count
+
+
+@inlined
+def settle(work: Record, count: int, radius: float, twist: Twist) -> Twist:
+    """Return the velocities without what rounding left of closed contacts and ended slips."""
+    v, w = twist
+    for _ in range(_MOST_PROJECTIONS if count > 1 else count):
+        largest = 0.0
+        for i in range(count):
+            contact = work.contact[i]
+            left = opening(contact, v)
+            v = plus(v, -left, vector(contact.normal))
+            largest = max(largest, abs(left))
+        if largest < 1e-16:
+            break
+    if count == 1:
+        contact = work.contact[0]
+        u = true_slip(contact, radius, Twist(v, w))
+        if 0.0 < norm(u) <= STICK_M_S:
+            v = plus(v, -SLIP_SHARE, u)
+            w = plus(w, 2.5 * SLIP_SHARE / radius, cross(vector(contact.normal), u))
+    return Twist(v, w)

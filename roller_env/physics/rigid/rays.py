@@ -1,0 +1,138 @@
+"""Rays from the balls: how far it is to the first solid."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.physics.rigid.closest import from_centre, local
+from roller_env.physics.rigid.kernels import (
+    Record,
+    Vector,
+    add,
+    entry,
+    inlined,
+    kernel,
+    plus,
+    row,
+    vector,
+)
+from roller_env.physics.rigid.scene import MARGIN_M, Scenes
+from roller_env.physics.rigid.states import States
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+
+_PARALLEL: Final = 1e-15
+
+
+@entry
+def cast_rays(
+    scenes: Scenes,
+    level_of_row: Int64,
+    states: States,
+    rows: Int64,
+    offsets: Float64,
+    directions: Float64,
+    longest: float,
+    out: Float64,
+) -> None:
+    """Write how far it is from beside some balls to the first solid; the balls are none.
+
+    From inside a solid it is the way out of it, as MuJoCo has it.
+
+    Args:
+        scenes: the solids.
+        level_of_row: (N,) which level each ball is in.
+        states: where the balls and slabs are.
+        rows: (n,) which balls.
+        offsets: (R, 3) where each ray begins, from the ball's centre, metres, world frame.
+        directions: (R, 3) unit vectors, world frame.
+        longest: how far to look, metres; ``inf`` only for rays that are vertical.
+        out: (n, R) receives the distances in metres, ``inf`` where there is nothing.
+    """
+    for place in range(len(rows)):
+        number = rows[place]
+        level = scenes.level[level_of_row[number]]
+        ball = row(states.position, number)
+        for ray in range(len(directions)):
+            origin = add(ball, row(offsets, ray))
+            out[place, ray] = _first(
+                scenes, level, states.slab, number, origin, row(directions, ray), longest
+            )
+
+
+@inlined
+def _first(
+    scenes: Scenes,
+    level: Record,
+    slab: Float64,
+    number: int,
+    origin: Vector,
+    direction: Vector,
+    longest: float,
+) -> float:
+    """Return how far it is to the first solid along one ray.
+
+    A cell lists all that is within the margin of it. So the ray is looked at from points on it
+    that are twice as far apart, each for what is before and behind it.
+    """
+    margin = level.radius + MARGIN_M
+    # A vertical ray stays over one cell.
+    level_part = math.sqrt(direction[0] * direction[0] + direction[1] * direction[1])
+    half = margin / level_part if level_part > _PARALLEL else math.inf
+    nearest = math.inf
+    middle = 0.0 if half == math.inf else half
+    while True:
+        at = origin if middle == 0.0 else plus(origin, middle, direction)
+        x = math.floor((at[0] - level.origin[0]) / level.cell)
+        y = math.floor((at[1] - level.origin[1]) / level.cell)
+        if 0 <= x < level.grid[0] and 0 <= y < level.grid[1]:
+            cell = level.first_cell + x * level.grid[1] + y
+            for place in range(scenes.cell_start[cell], scenes.cell_start[cell + 1]):
+                solid = scenes.solid[scenes.cell_solid[place]]
+                shift = slab[number, solid.slab] if solid.slab >= 0 else 0.0
+                if _may_meet(solid, shift, origin, direction):
+                    relative = from_centre(solid, shift, origin)
+                    nearest = min(nearest, _into(solid, relative, direction))
+        middle += half
+        if nearest <= middle or middle >= longest:
+            break
+        middle += half
+    return nearest if nearest <= longest else math.inf
+
+
+@inlined
+def _may_meet(solid: Record, shift: float, origin: Vector, direction: Vector) -> bool:
+    """Say whether a ray's bounding box meets a solid's."""
+    low, high = vector(solid.low), vector(solid.high)
+    z = origin[2] - shift
+    return not (
+        (z < low[2] and direction[2] <= 0.0)
+        or (z > high[2] and direction[2] >= 0.0)
+        or (origin[0] < low[0] and direction[0] <= 0.0)
+        or (origin[0] > high[0] and direction[0] >= 0.0)
+        or (origin[1] < low[1] and direction[1] <= 0.0)
+        or (origin[1] > high[1] and direction[1] >= 0.0)
+    )
+
+
+@kernel
+def _into(solid: Record, from_middle: Vector, direction: Vector) -> float:
+    """Return how far it is to the surface of a box, ``inf`` if the ray misses it."""
+    at, way = local(solid, from_middle), local(solid, direction)
+    half = vector(solid.half)
+    enters, leaves = -math.inf, math.inf
+    for k in range(3):
+        if abs(way[k]) < _PARALLEL:
+            if abs(at[k]) > half[k]:
+                return math.inf
+            continue
+        one, other = (-half[k] - at[k]) / way[k], (half[k] - at[k]) / way[k]
+        enters, leaves = max(enters, min(one, other)), min(leaves, max(one, other))
+    if enters > leaves or leaves < 0.0:
+        return math.inf
+    return enters if enters >= 0.0 else leaves

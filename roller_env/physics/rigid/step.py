@@ -1,0 +1,406 @@
+"""The motion of balls among solids, from event to event.
+
+A segment is the motion between two events under one set of held contacts. In order:
+
+1. **near**: the solids that the ball can reach, and those it touches;
+2. **weld**: what touches twice counts once, inner edges do not count at all;
+3. **impact**: whatever approaches is stopped or thrown back, all contacts at once;
+4. **holding**: which contacts press, stick and slip, and the accelerations that follow;
+5. **motion**: a parabola, a skid that turns (both exact), or a step of RK4 around edges and corners
+   and for slips that turn at several contacts, no longer than the cap;
+6. **events**: the first of the end of the step, the end of a slip, a contact that lets go, a
+   feature that ends, and the next impact.
+
+A ball needs nothing of the others, so any split of the rows over threads gives the same bits.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from roller_env.physics.rigid.attitude import turn, turned, turned_back
+from roller_env.physics.rigid.events import features_end, goes_alone, next_impact
+from roller_env.physics.rigid.holding import (
+    CURVE,
+    PARABOLA,
+    SKID,
+    STEP,
+    Motion,
+    choose_motion,
+    end_slip,
+    slips_end,
+    slowing,
+)
+from roller_env.physics.rigid.impact import collide, keep_closed, settle
+from roller_env.physics.rigid.impact_time import CONTACT_GAP_M
+from roller_env.physics.rigid.kernels import (
+    Ball,
+    Record,
+    Records,
+    Twist,
+    Vector,
+    entry,
+    inlined,
+    kernel,
+    norm,
+    plus,
+    position_at,
+    put,
+    row,
+    scaled,
+    sub,
+    vector,
+)
+from roller_env.physics.rigid.motion import (
+    arc_end,
+    back_to_surface,
+    curve_until,
+    hermite,
+    runge_kutta,
+    skid,
+    skid_end,
+)
+from roller_env.physics.rigid.near import gather, look_ahead, time_within, touch, weld
+from roller_env.physics.rigid.scene import MARGIN_M, Scenes
+from roller_env.physics.rigid.slabs import move_slabs, set_going, time_to_stop
+from roller_env.physics.rigid.states import Commands, Counts, States
+from roller_env.physics.rigid.workspace import Workspace
+
+Float64 = npt.NDArray[np.float64]
+Int64 = npt.NDArray[np.int64]
+
+MOST_SEGMENTS: Final = 200
+"""In one control step; beyond it the ball is moved on by force, and that is counted."""
+
+FORCED_STEP_S: Final = 1e-3
+
+MANY_SEGMENTS: Final = 32
+"""In one control step; beyond it contacts change faster than is worth following (a ball that spins
+in a corner chatters against its walls), and several at once are stepped over."""
+
+SHORTEST_S: Final = 1e-13
+
+_MOST_REFINEMENTS: Final = 4
+
+
+class Course(NamedTuple):
+    """The way of a ball until the next event, as a parabola from where it is."""
+
+    until: float  # duration, seconds
+    limit: float  # the same, if it meets nothing
+    acceleration: Vector  # of the parabola
+    there: Ball  # the ball at the limit, of motions that are no parabolas
+    alone: int  # 1 if the ball is known to meet nothing, and to leave nothing
+
+
+@entry
+def advance(
+    scenes: Scenes,
+    level_of_row: Int64,
+    states: States,
+    commands: Commands,
+    rows: Int64,
+    duration: float,
+    cap: float,
+    path: Float64,
+    counts: Counts,
+    workspace: Workspace,
+    thread: int,
+) -> None:
+    """Move the balls of some rows by a control step.
+
+    Args:
+        scenes: what they meet.
+        level_of_row: (N,) which level each ball is in.
+        states: where they are; changed in place.
+        commands: what is done to them.
+        rows: (n,) which of them to move.
+        duration: of the control step, seconds.
+        cap: longest step of RK4, seconds.
+        path: (N, S + 1, 3) receives the centres at the start and after each S-th of the step.
+        counts: counted up.
+        workspace: made for the scenes.
+        thread: which of its memories to use; no other thread may use it meanwhile.
+    """
+    work = workspace.work[thread]
+    for place in range(len(rows)):
+        number = rows[place]
+        level_number = level_of_row[number]
+        level = scenes.level[level_number]
+        slabs = workspace.slab[thread, : level.slabs]
+        set_going(scenes, level_number, states, commands, number, slabs)
+        force = row(commands.force, number)
+        pull = (
+            force[0] / level.mass,
+            force[1] / level.mass,
+            force[2] / level.mass - level.gravity,
+        )
+        orientation = states.orientation[number]
+        spin = turned(orientation, row(states.spin, number))
+        ball = Ball(row(states.position, number), row(states.velocity, number), spin)
+        work.segments = work.forced = work.unsolved = work.blocked = 0
+        delay = min(commands.delay[number], duration)
+        ball = _advance_ball(
+            scenes, level, slabs, work, ball, orientation, pull, delay, duration, cap, path[number]
+        )
+        put(states.position, number, ball.position)
+        put(states.velocity, number, ball.velocity)
+        put(states.spin, number, turned_back(orientation, ball.spin))
+        for k in range(len(slabs)):
+            states.slab[number, k] = slabs[k].shift
+        counts.segments[number] += work.segments
+        counts.forced[number] += work.forced
+        counts.unsolved[number] += work.unsolved
+        counts.blocked[number] += work.blocked
+
+
+@inlined
+def _advance_ball(
+    scenes: Scenes,
+    level: Record,
+    slabs: Records,
+    work: Record,
+    ball: Ball,
+    orientation: Any,
+    pull: Vector,
+    delay: float,
+    duration: float,
+    cap: float,
+    path: Any,
+) -> Ball:
+    """Return a ball after a control step; turn its orientation, in place."""
+    radius, solids = level.radius, scenes.solid
+    put(path, 0, ball.position)
+    sampled = 1
+    while sampled < len(path) and sampled * duration <= delay * (len(path) - 1):
+        put(path, sampled, ball.position)
+        sampled += 1
+    time = delay
+    centre, listed = ball.position, -1.0  # what is listed as near is so around this place
+    force = norm(pull)
+    while time < duration:
+        work.segments += 1
+        speed, rest = norm(ball.velocity), duration - time
+        left = min(look_ahead(speed, force, rest), time_to_stop(slabs))
+        way = speed * left + force * left * left
+        if norm(sub(ball.position, centre)) + way > listed:
+            centre = ball.position
+            listed = min(speed * rest + force * rest * rest, MARGIN_M) + CONTACT_GAP_M
+            gather(scenes, level, slabs, work, centre, listed, rest)
+        count = touch(solids, slabs, work, radius, ball.position)
+        if count > 0:
+            count, ball = _meet(work, slabs, solids, count, radius, ball)
+        twist = Twist(ball.velocity, ball.spin)
+        many = work.segments > MANY_SEGMENTS
+        motion = choose_motion(work, count, radius, twist, pull, 0.25 * cap, many)
+        if not motion.solved:
+            work.unsolved += 1
+        course = _plan(work, solids, motion, radius, ball, pull, way, left, cap)
+        course = _until(work, solids, motion, radius, ball, pull, way, course)
+        if work.segments > MOST_SEGMENTS:
+            course = _at(course, max(course.until, min(rest, FORCED_STEP_S)))
+            work.forced += 1
+        after = _move(work, solids, motion, radius, ball, pull, course)
+        sampled = _sample(
+            work, motion.kind, radius, ball, after, pull, course, path, sampled, time, duration
+        )
+        turn(orientation, ball.spin, after.spin, course.until)
+        ball = after
+        move_slabs(slabs, course.until)
+        time += course.until
+        if duration - time < SHORTEST_S:
+            time = duration
+    while sampled < len(path):
+        put(path, sampled, ball.position)
+        sampled += 1
+    return ball
+
+
+@inlined
+def _sample(
+    work: Record,
+    kind: int,
+    radius: float,
+    ball: Ball,
+    after: Ball,
+    pull: Vector,
+    course: Course,
+    path: Any,
+    sampled: int,
+    time: float,
+    duration: float,
+) -> int:
+    """Write where a ball is on its course at the next S-ths of the step; return which is next."""
+    piece = duration / (len(path) - 1)
+    end = (time + course.until) * (1.0 + 1e-15)
+    while sampled < len(path) and sampled * piece <= end:
+        at = sampled * piece - time
+        put(path, sampled, _between(work, kind, radius, ball, after, pull, course, at))
+        sampled += 1
+    return sampled
+
+
+@inlined
+def _between(
+    work: Record,
+    kind: int,
+    radius: float,
+    ball: Ball,
+    after: Ball,
+    pull: Vector,
+    course: Course,
+    time: float,
+) -> Vector:
+    """Return where a ball is ``time`` after it set out on a course that ends at ``after``."""
+    if kind == SKID:
+        return skid(work.contact[0], radius, ball, pull, time).position
+    if kind == CURVE:
+        return hermite(ball, after, course.until, time)
+    return position_at(ball.position, ball.velocity, course.acceleration, time)
+
+
+@inlined
+def _meet(
+    work: Record, slabs: Records, solids: Records, count: int, radius: float, ball: Ball
+) -> tuple[int, Ball]:
+    """Return how many contacts stay closed, and the ball after their impacts.
+
+    It is moved by less than a contact's gap, to half of that away from each contact.
+    """
+    count = weld(work, count, radius)
+    p = ball.position
+    for i in range(count):
+        contact = work.contact[i]
+        p = plus(p, 0.5 * CONTACT_GAP_M - contact.gap, vector(contact.normal))
+    twist = Twist(ball.velocity, ball.spin)
+    twist, solved, blocked = collide(work, slabs, solids, count, radius, twist)
+    if not solved:
+        work.unsolved += 1
+    if blocked > 0:
+        work.blocked += blocked
+        for place in range(work.found):
+            slab = solids[work.near[place].solid].slab
+            if slab >= 0:
+                work.near[place].rise = slabs[slab].speed
+    count = keep_closed(work, count, twist.linear)
+    twist = settle(work, count, radius, twist)
+    return count, Ball(p, twist.linear, twist.angular)
+
+
+@inlined
+def _plan(
+    work: Record,
+    solids: Records,
+    motion: Motion,
+    radius: float,
+    ball: Ball,
+    pull: Vector,
+    way: float,
+    left: float,
+    cap: float,
+) -> Course:
+    """Return the course of a ball that meets nothing, no further than ``way``."""
+    holding, twist = motion.holding, Twist(ball.velocity, ball.spin)
+    # Spin and wedges can drive a ball faster than forces alone.
+    changes = 1.0 if motion.kind == PARABOLA or motion.kind == STEP else 2.0
+    left = time_within(way, norm(ball.velocity), changes * norm(motion.rates.linear), left)
+    if motion.kind == PARABOLA:
+        limit = left
+        if holding > 0:
+            limit = min(left, slips_end(work, holding, radius, twist, motion.rates))
+        return Course(limit, limit, motion.rates.linear, ball, 0)
+    if motion.kind == STEP:
+        limit = min(left, motion.step)
+        return Course(limit, limit, motion.rates.linear, ball, 0)
+    if motion.kind == SKID:
+        contact = work.contact[0]
+        limit = min(left, skid_end(contact, radius, ball, pull))
+        if goes_alone(work, solids, ball.position, way, limit):
+            return Course(limit, limit, pull, skid(contact, radius, ball, pull, limit), 1)
+        limit = min(limit, cap)
+        there = skid(contact, radius, ball, pull, limit)
+    else:
+        limit = min(left, cap, arc_end(work, holding, radius, ball.velocity))
+        limit = min(limit, max(0.5 * slowing(work, holding, radius, twist), cap / 64.0))
+        limit, there = curve_until(work, solids, holding, radius, ball, pull, limit)
+    return Course(limit, limit, _through(ball, there.position, limit), there, 0)
+
+
+@kernel
+def _at(course: Course, until: float) -> Course:
+    """Return a course that ends at another time."""
+    return Course(until, course.limit, course.acceleration, course.there, course.alone)
+
+
+@kernel
+def _through(ball: Ball, there: Vector, time: float) -> Vector:
+    """Return the acceleration of the parabola that leads a ball to a place in ``time``."""
+    missed = sub(there, plus(ball.position, time, ball.velocity))
+    return scaled(2.0 / (time * time), missed)
+
+
+@inlined
+def _until(
+    work: Record,
+    solids: Records,
+    motion: Motion,
+    radius: float,
+    ball: Ball,
+    pull: Vector,
+    way: float,
+    course: Course,
+) -> Course:
+    """Return a course that ends where the ball leaves a feature or meets a solid."""
+    if course.alone:
+        return course
+    p, v, holding = ball.position, ball.velocity, motion.holding
+    for _ in range(_MOST_REFINEMENTS):
+        a, until = course.acceleration, course.until
+        if motion.kind != CURVE:
+            until = features_end(work, solids, holding, p, v, a, way, until)
+        until = next_impact(work, solids, holding, radius, p, v, a, way, until)
+        exact = motion.kind == PARABOLA or motion.kind == STEP
+        if exact or until >= course.until or until <= 0.0:
+            break
+        # A parabola through both ends of a curve is off between them: end it here, and look again.
+        if motion.kind == CURVE:
+            there = runge_kutta(work, holding, radius, ball, pull, until)
+        else:
+            there = skid(work.contact[0], radius, ball, pull, until)
+        course = Course(until, until, _through(ball, there.position, until), there, 0)
+    return _at(course, until)
+
+
+@inlined
+def _move(
+    work: Record,
+    solids: Records,
+    motion: Motion,
+    radius: float,
+    ball: Ball,
+    pull: Vector,
+    course: Course,
+) -> Ball:
+    """Return the ball at the end of its course."""
+    time, holding = course.until, motion.holding
+    after = course.there
+    if motion.kind == PARABOLA or motion.kind == STEP:
+        after = Ball(
+            position_at(ball.position, ball.velocity, motion.rates.linear, time),
+            plus(ball.velocity, time, motion.rates.linear),
+            plus(ball.spin, time, motion.rates.angular),
+        )
+    elif time != course.limit:
+        if motion.kind == CURVE:
+            after = runge_kutta(work, holding, radius, ball, pull, time)
+        else:
+            after = skid(work.contact[0], radius, ball, pull, time)
+    p, twist = after.position, Twist(after.velocity, after.spin)
+    if motion.kind == CURVE or motion.kind == STEP:
+        p = back_to_surface(work, solids, holding, radius, p, time)
+    if time == course.limit:
+        twist = end_slip(work, holding, radius, twist)
+    return Ball(p, twist.linear, twist.angular)
