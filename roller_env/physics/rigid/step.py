@@ -62,6 +62,7 @@ from roller_env.physics.rigid.motion import (
     runge_kutta,
     skid,
     skid_end,
+    without_gain,
 )
 from roller_env.physics.rigid.near import gather, look_ahead, time_within, touch, weld
 from roller_env.physics.rigid.scene import MARGIN_M, Scenes
@@ -405,6 +406,7 @@ def _move(
     p, twist = after.position, Twist(after.velocity, after.spin)
     if motion.kind == CURVE or motion.kind == STEP:
         p = back_to_surface(work, solids, holding, radius, p, time)
+        twist = without_gain(work, holding, radius, ball, pull, p, twist)
     if time == course.limit:
         twist = end_slip(work, holding, radius, twist)
     return Ball(p, twist.linear, twist.angular)
