@@ -184,7 +184,9 @@ def slip_on_floor_and_wall(state: Float64, force: Float64, duration: float) -> F
         torque = -2.5 / RADIUS_M * np.cross(normals, drags).sum(axis=0)
         return np.concatenate([v, force + push @ units, torque])
 
-    return solve_ivp(rates, (0.0, duration), state, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    done = solve_ivp(rates, (0.0, duration), state, "DOP853", rtol=1e-13, atol=1e-14)
+    end: Float64 = done.y[:, -1]
+    return end
 
 
 def test_a_ball_slips_on_floor_and_wall_as_dop853_has_it() -> None:
