@@ -17,6 +17,7 @@ from roller_env.physics.rigid.kernels import (
     dot,
     inlined,
     kernel,
+    none_of,
     norm,
     plus,
     scaled,
@@ -166,7 +167,7 @@ def choose_motion(
 @kernel
 def _pressing_first(work: Record, count: int) -> int:
     """Put the contacts that press first; return how many there are."""
-    i = 0
+    i = none_of(count)
     while i < count:
         if work.contact[i].push <= 0.0:
             count -= 1
