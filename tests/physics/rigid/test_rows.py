@@ -106,3 +106,16 @@ def test_a_hundred_thousand_balls_take_less_than_a_gigabyte() -> None:
     ]
     assert isinstance(make_commands(scenes, 1), Commands)
     assert sum(array.nbytes for array in arrays) < 50e6
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e12])
+def test_a_ball_out_of_all_bounds_ends_its_step_and_leaves_others_alone(bad: float) -> None:
+    wall = SolidBox((3.0, 0.0, 0.0), (0.5, 50.0, 5.0))
+    alone, beside = World([floor(), wall]), World([floor(), wall], 3)
+    for world in (alone, beside):
+        world.put((0.0, 0.0, RESTING_M), (4.0, 1.0, 0.0))
+    beside.states.velocity[0] = bad
+    beside.states.spin[2] = bad
+    alone.run(1.0)
+    beside.run(1.0)
+    assert beside.states.position[1].tobytes() == alone.states.position[0].tobytes()
