@@ -78,7 +78,7 @@ class DeviceFunction(Generic[_P, _R]):
     @cached_property
     def dispatcher(self) -> Any:
         """What Numba has of it."""
-        return _jit(self.function, nogil=True, _nrt=False)
+        return _jit(self.function, nogil=True, _nrt=False, forceinline=False)
 
     def __call__(self, *arguments: _P.args, **named: _P.kwargs) -> _R:
         """Call it from Python."""
@@ -96,7 +96,7 @@ def inlined(function: Callable[_P, _R]) -> Callable[_P, _R]:
     For what is handed dozens of arrays, which would be copied for the call, or has one caller.
     Python cannot call it.
     """
-    return _hidden(function, forceinline=True)
+    return _hidden(function, inline=True)
 
 
 def part(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -104,10 +104,10 @@ def part(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
     That takes a fifth of the time of compiling.
     """
-    return _hidden(function)
+    return _hidden(function, inline=False)
 
 
-def _hidden(function: Callable[_P, _R], **options: bool) -> Callable[_P, _R]:
+def _hidden(function: Callable[_P, _R], *, inline: bool) -> Callable[_P, _R]:
     # Numba has public names for neither the switch of its counting runtime nor those of the
     # wrappers it makes for Python and C; see `numba.core.options`.
     hidden = _jit(
@@ -116,7 +116,8 @@ def _hidden(function: Callable[_P, _R], **options: bool) -> Callable[_P, _R]:
         _nrt=False,
         no_cpython_wrapper=True,
         no_cfunc_wrapper=True,
-        **options,
+        # Said of each: what says nothing of it takes it from its caller.
+        forceinline=inline,
     )
     return cast("Callable[_P, _R]", hidden)
 
@@ -146,9 +147,9 @@ def _numba() -> ModuleType:
     from numba.core import event
     from numba.extending import typeof_impl
 
-    @typeof_impl.register(DeviceFunction)  # type: ignore[untyped-decorator]
+    @typeof_impl.register(DeviceFunction)
     def _(function: DeviceFunction[..., Any], context: Any) -> Any:
-        return numba.typeof(function.dispatcher)
+        return numba.typeof(function.dispatcher)  # type: ignore[no-untyped-call]
 
     class Waiting(event.Listener):
         """Hears when Numba compiles, which it does not when it finds what it had compiled."""

@@ -109,13 +109,13 @@ class RigidPhysics:
 
     def diverged(self) -> Bool:
         """Say which worlds are no longer finite."""
-        finite: Bool = np.isfinite(self.state).all(axis=1)
-        return ~finite
+        failed: Bool = (~np.isfinite(self.state)).any(axis=1)
+        return failed
 
     def rays(
         self, offsets: Float64, directions: Float64, longest: float, worlds: Int64 | None
     ) -> Float64:
-        """Return the distances, (n, rays) metres, to the first solid along each ray; else ``inf``."""
+        """Return the distances, (n, rays) metres, to the first solid along each ray."""
         rows = self._every if worlds is None else worlds
         self._read()
         found = np.empty((len(rows), len(directions)))

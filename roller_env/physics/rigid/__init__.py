@@ -14,5 +14,7 @@ engine goes from event to event:
 - `coulomb`: impulses and forces at several contacts at once, with Coulomb's circular cone;
 - `impact` and `holding`: what they do at an impact, and to a ball that is held;
 - `motion`: skids, edges and corners; `sliding`: a skid that turns, in closed form;
+- `rays`: how far it is from a ball to the first solid;
+- `linear`: small systems of equations; `kernels`: vectors, and how functions are compiled;
 - `attitude`: the quaternion of a ball whose angular velocity changes linearly.
 """

@@ -34,6 +34,7 @@ from roller_env.physics.rigid.kernels import (
     cross,
     dot,
     kernel,
+    none_of,
     norm,
     plus,
     put,
@@ -421,7 +422,7 @@ def _hold_several(work: Record, count: int, radius: float, free: Twist) -> Twist
     that slips; its equations that the velocity of the one's point, and the normal velocity of the
     other, are what they should be.
     """
-    size = 0
+    size = none_of(count)
     for i in range(count):
         contact = work.contact[i]
         contact.first = size
@@ -491,7 +492,7 @@ def _polish(
 
     Returns whether it ended at an answer, and the velocities. If not, the impulses are as before.
     """
-    m = 0
+    m = none_of(count)
     for i in range(count):
         contact = work.contact[i]
         contact.kept_push = contact.push

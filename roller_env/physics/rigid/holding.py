@@ -6,7 +6,7 @@ import math
 from typing import Final, NamedTuple
 
 from roller_env.physics.rigid.closest import EDGE, FACE
-from roller_env.physics.rigid.coulomb import EXACT, SLIPS, solve
+from roller_env.physics.rigid.coulomb import EXACT, SLIPS, slip, solve
 from roller_env.physics.rigid.impact import STICK_M_S, calmed, true_slip, velocity_over
 from roller_env.physics.rigid.kernels import (
     Ball,
@@ -17,6 +17,7 @@ from roller_env.physics.rigid.kernels import (
     dot,
     inlined,
     kernel,
+    none_of,
     norm,
     plus,
     scaled,
@@ -141,7 +142,7 @@ def choose_motion(
         if solved:
             holding = _pressing_first(work, count)
             kind = _kind_of_motion(work, holding, radius, twist, rates)
-            ends = slowing(work, holding, radius, twist) if kind == CURVE else math.inf
+            ends = slip_time(work, holding, radius, twist, rates) if kind == CURVE else math.inf
             if ends >= 0.25 * step:
                 return Motion(kind, rates, holding, True, step)
             # What slips hardly at all turns its slip faster than steps of RK4 could follow.
@@ -166,7 +167,7 @@ def choose_motion(
 @kernel
 def _pressing_first(work: Record, count: int) -> int:
     """Put the contacts that press first; return how many there are."""
-    i = 0
+    i = none_of(count)
     while i < count:
         if work.contact[i].push <= 0.0:
             count -= 1
@@ -177,14 +178,17 @@ def _pressing_first(work: Record, count: int) -> int:
 
 
 @kernel
-def slowing(work: Record, count: int, radius: float, twist: Twist) -> float:
-    """Return the time in which friction alone would end the first slip, or ``inf``."""
+def slip_time(work: Record, count: int, radius: float, twist: Twist, rates: Twist) -> float:
+    """Return in what time the first slip would end or turn round as it changes now, or ``inf``."""
     time = math.inf
     for i in range(count):
         contact = work.contact[i]
-        friction = contact.friction * contact.push
-        if contact.slides and friction > 0.0:
-            time = min(time, norm(true_slip(contact, radius, twist)) / (3.5 * friction))
+        if contact.slides:
+            d, change = vector(contact.direction), slip(contact, radius, rates)
+            along = dot(d, change)
+            fastest = max(-along, norm(plus(change, -along, d)))
+            if fastest > 0.0:
+                time = min(time, norm(true_slip(contact, radius, twist)) / fastest)
     return time
 
 

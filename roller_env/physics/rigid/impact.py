@@ -14,6 +14,7 @@ from roller_env.physics.rigid.kernels import (
     dot,
     inlined,
     kernel,
+    none_of,
     norm,
     plus,
     store,
@@ -117,7 +118,7 @@ def collide(
 def keep_closed(work: Record, count: int, v: Vector) -> int:
     """Leave out contacts that open; return how many are left."""
     fastest = closed_m_s(count)
-    i = 0
+    i = none_of(count)
     while i < count:
         if opening(work.contact[i], v) > fastest:
             count -= 1

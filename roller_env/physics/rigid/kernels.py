@@ -39,6 +39,12 @@ class Ball(NamedTuple):
 
 
 @kernel
+def none_of(count: int) -> int:
+    """Return 0. What is called with the literal and then with numbers Numba compiles twice."""
+    return count - count
+
+
+@kernel
 def dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 

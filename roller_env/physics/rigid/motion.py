@@ -258,3 +258,29 @@ def back_to_surface(
             if abs(error) < 1e-3:
                 p = plus(p, -error, n)
     return p
+
+
+@kernel
+def without_gain(
+    work: Record, count: int, radius: float, ball: Ball, pull: Vector, p: Vector, twist: Twist
+) -> Twist:
+    """Return the velocities at ``p``, slower if friction would have given the ball energy.
+
+    Steps err to both sides. Contacts that stand still ask of velocities only that some parts of
+    them are 0, which a smaller multiple keeps.
+    """
+    for i in range(count):
+        if work.contact[i].rise != 0.0:
+            return twist
+    before = _kinetic(radius, ball.velocity, ball.spin) + dot(pull, sub(p, ball.position))
+    after = _kinetic(radius, twist.linear, twist.angular)
+    if after <= before or after <= 0.0:
+        return twist
+    share = math.sqrt(max(before, 0.0) / after)
+    return Twist(scaled(share, twist.linear), scaled(share, twist.angular))
+
+
+@kernel
+def _kinetic(radius: float, v: Vector, w: Vector) -> float:
+    """Return the kinetic energy over the mass."""
+    return 0.5 * dot(v, v) + 0.2 * radius * radius * dot(w, w)

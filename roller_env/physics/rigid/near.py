@@ -14,6 +14,7 @@ from roller_env.physics.rigid.kernels import (
     dot,
     inlined,
     kernel,
+    none_of,
     plus,
     row,
     store,
@@ -134,7 +135,7 @@ def weld(work: Record, count: int, radius: float) -> int:
     An edge or corner that lies in a plane on which the ball rests is an inner one, or one that it
     has not reached; it neither stops nor lifts. Of two equal features one is enough.
     """
-    i = 0
+    i = none_of(count)
     while i < count:
         a = work.contact[i]
         inner = False

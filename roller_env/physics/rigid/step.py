@@ -31,8 +31,8 @@ from roller_env.physics.rigid.holding import (
     Motion,
     choose_motion,
     end_slip,
+    slip_time,
     slips_end,
-    slowing,
 )
 from roller_env.physics.rigid.impact import collide, keep_closed, settle
 from roller_env.physics.rigid.impact_time import CONTACT_GAP_M
@@ -62,6 +62,7 @@ from roller_env.physics.rigid.motion import (
     runge_kutta,
     skid,
     skid_end,
+    without_gain,
 )
 from roller_env.physics.rigid.near import gather, look_ahead, time_within, touch, weld
 from roller_env.physics.rigid.scene import MARGIN_M, Scenes
@@ -73,13 +74,15 @@ Float64 = npt.NDArray[np.float64]
 Int64 = npt.NDArray[np.int64]
 
 MOST_SEGMENTS: Final = 200
-"""In one control step; beyond it the ball is moved on by force, and that is counted."""
+"""In one control step, besides 8 for each time of the cap; beyond it the ball is moved on by force,
+and that is counted."""
 
 FORCED_STEP_S: Final = 1e-3
 
 MANY_SEGMENTS: Final = 32
-"""In one control step; beyond it contacts change faster than is worth following (a ball that spins
-in a corner chatters against its walls), and several at once are stepped over."""
+"""In one control step, besides 4 for each time of the cap; beyond it contacts change faster than is
+worth following (a ball that spins in a corner chatters against its walls), and several at once are
+stepped over."""
 
 SHORTEST_S: Final = 1e-13
 
@@ -194,13 +197,13 @@ def _advance_ball(
         if count > 0:
             count, ball = _meet(work, slabs, solids, count, radius, ball)
         twist = Twist(ball.velocity, ball.spin)
-        many = work.segments > MANY_SEGMENTS
+        many = work.segments > MANY_SEGMENTS + 4.0 * duration / cap
         motion = choose_motion(work, count, radius, twist, pull, 0.25 * cap, many)
         if not motion.solved:
             work.unsolved += 1
         course = _plan(work, solids, motion, radius, ball, pull, way, left, cap)
         course = _until(work, solids, motion, radius, ball, pull, way, course)
-        if work.segments > MOST_SEGMENTS:
+        if work.segments > MOST_SEGMENTS + 8.0 * duration / cap:
             course = _at(course, max(course.until, min(rest, FORCED_STEP_S)))
             work.forced += 1
         after = _move(work, solids, motion, radius, ball, pull, course)
@@ -324,7 +327,9 @@ def _plan(
         there = skid(contact, radius, ball, pull, limit)
     else:
         limit = min(left, cap, arc_end(work, holding, radius, ball.velocity))
-        limit = min(limit, max(0.5 * slowing(work, holding, radius, twist), cap / 64.0))
+        limit = min(
+            limit, max(0.5 * slip_time(work, holding, radius, twist, motion.rates), cap / 64.0)
+        )
         limit, there = curve_until(work, solids, holding, radius, ball, pull, limit)
     return Course(limit, limit, _through(ball, there.position, limit), there, 0)
 
@@ -401,6 +406,7 @@ def _move(
     p, twist = after.position, Twist(after.velocity, after.spin)
     if motion.kind == CURVE or motion.kind == STEP:
         p = back_to_surface(work, solids, holding, radius, p, time)
+        twist = without_gain(work, holding, radius, ball, pull, p, twist)
     if time == course.limit:
         twist = end_slip(work, holding, radius, twist)
     return Ball(p, twist.linear, twist.angular)
