@@ -109,8 +109,7 @@ class RigidPhysics:
 
     def diverged(self) -> Bool:
         """Say which worlds are no longer finite."""
-        failed: Bool = (~np.isfinite(self.state)).any(axis=1)
-        return failed
+        return np.logical_not(np.isfinite(self.state).all(axis=1))
 
     def rays(
         self, offsets: Float64, directions: Float64, longest: float, worlds: Int64 | None
