@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import matplotlib
 import numpy as np
@@ -25,6 +25,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 
 from roller_env.lab.runner import header
 from roller_env.lab.scene import ErrorKind
+from roller_env.lab.table import Frame
 
 STYLE: Final[dict[Any, Any]] = {
     "axes.edgecolor": "#888888",
@@ -38,6 +39,9 @@ STYLE: Final[dict[Any, Any]] = {
     "svg.hashsalt": "roller",
 }
 """Of every picture. The salt makes the same chart the same SVG."""
+
+styled: Final = matplotlib.rc_context(STYLE)
+"""Decorates what draws."""
 
 COLOURS: Final[dict[str, str]] = {
     "MuJoCo Euler": "#2f6db3",
@@ -71,23 +75,20 @@ def colour(method_name: str) -> str:
     return COLOURS[method_name.partition(",")[0]]
 
 
+@styled
 def save(figure: Figure, facts: Mapping[str, str], stem: Path) -> tuple[Path, Path]:
-    """Write the figure as ``stem.png`` and ``stem.svg`` with its provenance along the foot.
-
-    Returns:
-        Both paths.
-    """
+    """Write ``stem.png`` and ``stem.svg`` with provenance along the foot; return both paths."""
     foot: dict[str, Any] = {"fontsize": 6, "color": "#777777", "ha": "left", "va": "bottom"}
     figure.text(0.005, 0.004, header(facts), wrap=True, **foot)
     stem.parent.mkdir(parents=True, exist_ok=True)
     # Not with_suffix: a scene's name may have a point in it.
     png, svg = (stem.with_name(f"{stem.name}.{kind}") for kind in ("png", "svg"))
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(png, dpi=150, facecolor="white")
-        figure.savefig(svg, facecolor="white", metadata={"Date": None})
+    figure.savefig(png, dpi=150, facecolor="white")
+    figure.savefig(svg, facecolor="white", metadata={"Date": None})
     return png, svg
 
 
+@styled
 def grid(
     shape: tuple[int, int],
     title: str,
@@ -97,7 +98,7 @@ def grid(
     margins: tuple[float, float, float, float] = (0.9, 0.5, 1.0, 0.7),
     **subplots: Any,
 ) -> tuple[Figure, npt.NDArray[Any]]:
-    """Return a page of panels under a headline.
+    """Return a page of panels under a headline, and its panels (rows, columns).
 
     Args:
         shape: rows and columns.
@@ -106,42 +107,25 @@ def grid(
         panel: width and height of a panel, inches.
         margins: left, right, top and bottom of the page, inches.
         **subplots: further arguments of ``Figure.subplots``.
-
-    Returns:
-        The figure, and its panels (rows, columns).
     """
     rows, columns = shape
     left, right, top, bottom = margins
     width, height = left + right + panel[0] * columns, top + bottom + panel[1] * rows
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(width, height))
-        panels = figure.subplots(rows, columns, squeeze=False, **subplots)
-        figure.subplots_adjust(
-            left=left / width,
-            right=1.0 - right / width,
-            top=1.0 - top / height,
-            bottom=bottom / height,
-            wspace=0.28,
-            hspace=0.45,
-        )
-        said = textwrap.fill(note, round(14.5 * width))
-        figure.text(0.012, 1.0 - 0.3 / height, title, fontsize=14, weight="bold", va="center")
-        figure.text(0.012, 1.0 - 0.5 / height, said, fontsize=9, color=QUIET, va="top")
+    figure = Figure(figsize=(width, height))
+    panels = figure.subplots(rows, columns, squeeze=False, **subplots)
+    x, y = (left / width, 1.0 - right / width), (bottom / height, 1.0 - top / height)
+    figure.subplots_adjust(x[0], y[0], x[1], y[1], wspace=0.28, hspace=0.45)
+    said = textwrap.fill(note, round(14.5 * width))
+    figure.text(0.012, 1.0 - 0.3 / height, title, fontsize=14, weight="bold", va="center")
+    figure.text(0.012, 1.0 - 0.5 / height, said, fontsize=9, color=QUIET, va="top")
     return figure, panels
 
 
 def legend_of(figure: Figure, axes: Axes, columns: int = 4) -> None:
     """Write one legend for a page whose panels all show what ``axes`` shows."""
-    handles, labels = axes.get_legend_handles_labels()
-    unique = dict(zip(labels, handles, strict=True))
-    figure.legend(
-        unique.values(),
-        unique.keys(),
-        loc="lower right",
-        ncols=columns,
-        fontsize=8,
-        bbox_to_anchor=(0.995, 0.012),
-    )
+    unique = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    where: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (0.995, 0.012)}
+    figure.legend(unique.values(), unique.keys(), ncols=columns, fontsize=8, **where)
 
 
 def plain(axis: Any) -> None:
@@ -171,6 +155,7 @@ class Row:
     said: str = ""
 
 
+@styled
 def against_limits(
     rows: Sequence[Row],
     title: str,
@@ -184,78 +169,52 @@ def against_limits(
     """Draw values on a logarithmic axis, a line a label, against one limit for all."""
     labels = list(dict.fromkeys(row.label for row in rows))
     series = list(dict.fromkeys(row.series for row in rows))
-    figure, ((axes,),) = grid(
-        (1, 1),
-        title,
-        note,
-        panel=(6.2, 0.24 * len(labels) + 0.3),
-        margins=(label_in, 1.5, 1.1, 0.8),
-    )
-    with matplotlib.rc_context(STYLE):
-        if limit is not None:
-            axes.axvline(limit, color=PREDICTION, linewidth=1.0)
-        for row in rows:
-            shift = 0.22 * (series.index(row.series) - (len(series) - 1) / 2.0)
-            at = labels.index(row.label) + shift
-            mine = (
-                SERIES[series.index(row.series)] if row.series else (GOOD if row.good else FAILURE)
-            )
-            axes.plot(row.span, (at, at), color="#bbbbbb", linewidth=4.0, solid_capstyle="butt")
-            axes.plot(np.clip(row.value, *limits), at, "o", color=mine, markersize=5)
-            if row.said:
-                axes.text(1.02, at, row.said, transform=axes.get_yaxis_transform(), va="center",
-                          fontsize=8, color=mine)  # fmt: skip
-        axes.set(xscale="log", xlim=limits, ylim=(len(labels) - 0.4, -0.6))
-        axes.set_xlabel(xlabel, fontsize=9)
-        axes.set_yticks(range(len(labels)), labels, fontsize=7.5)
-        plain(axes.xaxis)
-        axes.grid(axis="y", visible=False)
-        if len(series) > 1:
-            marks = [Line2D([], [], marker="o", ls="", color=SERIES[i]) for i in range(len(series))]
-            axes.legend(marks, series, loc="lower right", fontsize=8)
+    panel, margins = (6.2, 0.24 * len(labels) + 0.3), (label_in, 1.5, 1.1, 0.8)
+    figure, ((axes,),) = grid((1, 1), title, note, panel=panel, margins=margins)
+    if limit is not None:
+        axes.axvline(limit, color=PREDICTION, linewidth=1.0)
+    beside: dict[str, Any] = {"transform": axes.get_yaxis_transform(), "fontsize": 8}
+    for row in rows:
+        number = series.index(row.series)
+        at = labels.index(row.label) + 0.22 * (number - (len(series) - 1) / 2.0)
+        mine = SERIES[number] if row.series else (GOOD if row.good else FAILURE)
+        axes.plot(row.span, (at, at), color="#bbbbbb", linewidth=4.0, solid_capstyle="butt")
+        axes.plot(np.clip(row.value, *limits), at, "o", color=mine, markersize=5)
+        axes.text(1.02, at, row.said, va="center", color=mine, **beside)
+    axes.set(xscale="log", xlim=limits, ylim=(len(labels) - 0.4, -0.6))
+    axes.set_xlabel(xlabel, fontsize=9)
+    axes.set_yticks(range(len(labels)), labels, fontsize=7.5)
+    plain(axes.xaxis)
+    axes.grid(axis="y", visible=False)
+    if len(series) > 1:
+        marks = [Line2D([], [], marker="o", ls="", color=SERIES[i]) for i in range(len(series))]
+        axes.legend(marks, series, loc="lower right", fontsize=8)
     return figure
 
 
-def label(axes: Axes, names: Iterable[tuple[str, float, float, str]], **style: Any) -> None:
-    """Write names beside points of a panel with final limits, and move them apart.
-
-    Args:
-        axes: of the chart.
-        names: text, x, y and colour of each.
-        **style: further arguments of ``Axes.text``.
-    """
+def label(axes: Axes, names: Iterable[tuple[str, float, float, str]]) -> None:
+    """Write names, (text, x, y, colour), beside points of a panel with final limits, and apart."""
     points = list(names)
-    if not points:
-        return
-    texts = [axes.text(x, y, text, color=c, **{"fontsize": 7, **style}) for text, x, y, c in points]
-    axes.figure.canvas.draw()
-    adjust_text(
-        texts,
-        [x for _, x, _, _ in points],
-        [y for _, _, y, _ in points],
-        ax=axes,
-        arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.5},
-        iter_lim=120,
-    )
+    if points:
+        texts = [axes.text(x, y, text, color=c, fontsize=7) for text, x, y, c in points]
+        axes.figure.canvas.draw()
+        _, x, y, _ = zip(*points, strict=True)
+        arrow = {"arrowstyle": "-", "color": "#999999", "linewidth": 0.5}
+        adjust_text(texts, x, y, ax=axes, arrowprops=arrow, iter_lim=120)
 
 
 # --- error against cost ----------------------------------------------------------------------
 
-Cost = Literal["CPU time", "force evaluations"]
-COSTS: Final[tuple[Cost, ...]] = ("CPU time", "force evaluations")
+COSTS: Final[Mapping[str, str]] = {
+    "cpu_s_per_s": "CPU seconds for a simulated second",
+    "evaluations_per_s": "evaluations of the forces for a simulated second",
+}
+"""The columns of `roller_env.lab.scene.measure` that are costs, with an axis' label."""
 
 ROUNDING: Final = 1e-13
 """Errors below it are rounding of float64: the answer is exact."""
 
-_COST_COLUMN: Final[dict[Cost, str]] = {
-    "CPU time": "cpu_s_per_s",
-    "force evaluations": "evaluations_per_s",
-}
-_COST_LABELS: Final[dict[Cost, str]] = {
-    "CPU time": "CPU seconds for a simulated second",
-    "force evaluations": "evaluations of the forces for a simulated second",
-}
-_KINDS: Final[dict[ErrorKind, str]] = {
+_KINDS: Final[Mapping[ErrorKind, str]] = {
     "discretisation": "Discretisation error: against the same model with a vanishing time step.",
     "model": "Model error: against the rigid closed form, which a soft contact does not approach "
     "however small the step.",
@@ -266,75 +225,75 @@ _SHOWN: Final = (1e-16, 1e12)
 
 @dataclass(frozen=True)
 class Plot:
-    """One scene's error, with all that is drawn of it.
+    """One scene's error, with all that is drawn of it: points of `roller_env.lab.scene.measure`.
 
     Attributes:
         title: of the scene.
         label: of the error's axis.
         kind: of the error.
-        curves: method, and its points before the first that fails: (dt_s, error, {cost: value}),
-            smallest time step first.
-        fronts: of each cost, the points that no other beats: (method, dt_s, error, value).
-        failures: method, its smallest failing step and what that costs.
+        curves: each method's points before the first that fails, smallest time step first.
+        fronts: of each of `COSTS`, the points that no other beats.
+        failures: each method's smallest failing step.
         limits_s: method and the time step above which it is predicted to blow up.
     """
 
     title: str
     label: str
     kind: ErrorKind
-    curves: Mapping[str, Sequence[tuple[float, float, Mapping[Cost, float]]]]
-    fronts: Mapping[Cost, Sequence[tuple[str, float, float, float]]]
-    failures: Mapping[str, tuple[float, Mapping[Cost, float]]]
-    limits_s: Mapping[str, float] = field(default_factory=dict)
+    curves: Frame
+    fronts: Mapping[str, Frame]
+    failures: Frame
+    limits_s: Mapping[str, float]
 
 
+@styled
 def draw_scene(plot: Plot) -> Figure:
     """Draw one scene's error against both costs."""
     note = f"{_KINDS[plot.kind]} Lower left is better; labels are time steps. {_alike(plot)}"
-    figure, panels = grid((1, 2), plot.title, note, panel=(5.2, 5.0), margins=(0.9, 2.6, 1.7, 0.8),
-                          sharey=True)  # fmt: skip
-    with matplotlib.rc_context(STYLE):
-        for axes, cost in zip(panels[0], COSTS, strict=True):
-            _draw_panel(axes, plot, cost)
-            _draw_guides(axes)
-            axes.set_xlabel(_COST_LABELS[cost])
-            ends = [(m, c[end]) for m, c in plot.curves.items() for end in {0, len(c) - 1} if c]
-            at_ends = [
-                (duration(dt), costs[cost], _clipped(error), colour(method))
-                for method, (dt, error, costs) in ends
-            ]
-            front = [(duration(dt), x, _clipped(e), colour(m)) for m, dt, e, x in plot.fronts[cost]]
-            label(axes, dict.fromkeys([*front, *at_ends]))
-        panels[0, 0].set_ylabel(plot.label)
-        figure.legend(handles=_legend([plot]), loc="center right", fontsize=8)
+    figure, panels = grid(
+        (1, 2), plot.title, note, panel=(5.2, 5.0), margins=(0.9, 2.6, 1.7, 0.8), sharey=True
+    )
+    by_method = plot.curves.groupby("method", sort=False)
+    ends = [*by_method.head(1).itertuples(), *by_method.tail(1).itertuples()]
+    for axes, (cost, title) in zip(panels[0], COSTS.items(), strict=True):
+        _draw_panel(axes, plot, cost)
+        _draw_guides(axes)
+        axes.set_xlabel(title)
+        named = [
+            (duration(p.dt_s), getattr(p, cost), float(_clip(p.error)), colour(p.method))
+            for p in (*plot.fronts[cost].itertuples(), *ends)
+        ]
+        label(axes, dict.fromkeys(named))
+    panels[0, 0].set_ylabel(plot.label)
+    figure.legend(handles=_legend([plot]), loc="center right", fontsize=8)
     return figure
 
 
+@styled
 def draw_overview(plots: Sequence[Plot], columns: int = 3) -> Figure:
     """Draw the errors of several scenes against CPU time, a panel each."""
     columns = min(columns, len(plots))
-    lines = math.ceil(len(plots) / columns)
-    figure, panels = grid((lines, columns), "Error against cost", f"{_KINDS[plots[0].kind]} Lower "
-                          "left is better.", margins=(0.9, 2.7, 1.2, 0.8))  # fmt: skip
-    with matplotlib.rc_context(STYLE):
-        for axes, plot in zip(panels.ravel(), plots, strict=False):
-            _draw_panel(axes, plot, "CPU time")
-            axes.set_title(textwrap.fill(plot.title, 46), fontsize=10, weight="bold", loc="left")
-            axes.set_ylabel(plot.label, fontsize=8)
-            axes.set_xlabel(_COST_LABELS["CPU time"], fontsize=8)
-        for axes in panels.ravel()[len(plots) :]:
-            axes.set_axis_off()
-        figure.legend(handles=_legend(plots), loc="center right", fontsize=9)
+    shape = (math.ceil(len(plots) / columns), columns)
+    note = f"{_KINDS[plots[0].kind]} Lower left is better."
+    figure, panels = grid(shape, "Error against cost", note, margins=(0.9, 2.7, 1.2, 0.8))
+    for axes in panels.ravel()[len(plots) :]:
+        axes.set_axis_off()
+    for axes, plot in zip(panels.ravel(), plots, strict=False):
+        _draw_panel(axes, plot, "cpu_s_per_s")
+        axes.set_title(textwrap.fill(plot.title, 46), fontsize=10, weight="bold", loc="left")
+        axes.set_ylabel(plot.label, fontsize=8)
+        axes.set_xlabel(COSTS["cpu_s_per_s"], fontsize=8)
+    figure.legend(handles=_legend(plots), loc="center right", fontsize=9)
     return figure
 
 
-def _draw_panel(axes: Axes, plot: Plot, cost: Cost) -> None:
+def _draw_panel(axes: Axes, plot: Plot, cost: str) -> None:
     """Draw the front and every method's curve; above them its cross and its predicted limit."""
     front = plot.fronts[cost]
-    axes.plot([x for *_, x in front], [_clipped(e) for _, _, e, _ in front], color=PARETO, lw=9,
-              solid_capstyle="round", zorder=1.5)  # fmt: skip
-    for method, curve in plot.curves.items():
-        axes.plot([c[cost] for *_, c in curve], [_clipped(e) for _, e, _ in curve], **_line(method))
+    axes.plot(front[cost], _clip(front.error), c=PARETO, lw=9, solid_capstyle="round", zorder=1.5)
+    curves = dict(iter(plot.curves.groupby("method", sort=False)))
+    for method, curve in curves.items():
+        axes.plot(curve[cost], _clip(curve.error), **_line(method))
     axes.set(xscale="log", yscale="log")
     axes.margins(x=0.08)
     bottom, top = axes.get_ylim()
@@ -342,37 +301,39 @@ def _draw_panel(axes: Axes, plot: Plot, cost: Cost) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
     if bottom < ROUNDING:
         axes.axhspan(bottom, ROUNDING, color="#f3f3f3", zorder=0)
-        axes.text(0.01, bottom, "rounding: exact", transform=axes.get_yaxis_transform(), fontsize=7,
-                  color="#8a8a8a", va="bottom")  # fmt: skip
-    axes.set_ylim(bottom, top * (top / bottom) ** (0.16 if plot.failures else 0.0))
-    over = axes.get_xaxis_transform()
+        said: dict[str, Any] = {"fontsize": 7, "color": "#8a8a8a", "va": "bottom"}
+        inside = axes.get_yaxis_transform()
+        axes.text(0.01, bottom, "rounding: exact", transform=inside, **said)
+    axes.set_ylim(bottom, top * (top / bottom) ** (0.16 if len(plot.failures) else 0.0))
+    over: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "mew": 2}
     taken: dict[int, int] = {}
-    for method, (_, costs) in plot.failures.items():
-        place = round(4.0 * math.log10(costs[cost]))
-        height = 0.965 - 0.033 * taken.setdefault(place, 0)
-        taken[place] += 1
-        axes.plot(costs[cost], height, "x", ms=8, mew=2, color=colour(method), transform=over)
-    for method, limit_s in plot.limits_s.items():
-        for dt_s, _, costs in plot.curves.get(method, ())[:1]:
-            at = costs[cost] * dt_s / limit_s
-            axes.plot(at, 1.0, "|", ms=13, mew=2, color=colour(method), transform=over,
-                      clip_on=False)  # fmt: skip
+    for point in plot.failures.itertuples():
+        at = getattr(point, cost)
+        # Crosses of about one cost are put one below the other.
+        place = round(4.0 * math.log10(at))
+        taken[place] = taken.get(place, -1) + 1
+        height = 0.965 - 0.033 * taken[place]
+        axes.plot(at, height, "x", ms=8, color=colour(point.method), **over)
+    for method in plot.limits_s.keys() & curves.keys():
+        first = curves[method].iloc[0]
+        at = first[cost] * first.dt_s / plot.limits_s[method]
+        axes.plot(at, 1.0, "|", ms=13, color=colour(method), clip_on=False, **over)
 
 
-def _clipped(error: float) -> float:
-    return float(np.clip(error, *_SHOWN))
+def _clip(error: Any) -> Any:
+    return np.clip(error, *_SHOWN)
 
 
 def _line(method: str) -> dict[str, Any]:
     """Return how a method's curve is drawn: MuJoCo with discs, ours with open squares."""
-    ours = method.startswith("ours")
+    ours, own = method.startswith("ours"), colour(method)
     return {
-        "color": colour(method),
-        "linestyle": "--" if "pyramidal" in method else "-",
-        "linewidth": 1.3,
+        "color": own,
+        "lw": 1.3,
+        "ls": "--" if "pyramidal" in method else "-",
         "marker": "s" if ours else "o",
-        "markersize": 4.5,
-        "markerfacecolor": "white" if ours else colour(method),
+        "ms": 4.5,
+        "mfc": "white" if ours else own,
         "zorder": 3.0,
     }
 
@@ -399,19 +360,16 @@ def duration(seconds: float) -> str:
 
 def _alike(plot: Plot) -> str:
     """Return a sentence on the methods whose curves cover one another, or nothing."""
-    groups: list[list[str]] = []
-    errors = {name: {dt: error for dt, error, _ in curve} for name, curve in plot.curves.items()}
+    by_method = plot.curves.groupby("method", sort=False)
+    curves = {method: curve.set_index("dt_s").error for method, curve in by_method}
     # The rounding of 10^5 steps adds up to more than that of one.
-    exact = [
-        name
-        for name, own in errors.items()
-        if name not in plot.failures and max(own.values(), default=1.0) < 100.0 * ROUNDING
-    ]
-    for method in [name for name in errors if name not in exact]:
-        for group in groups:
-            if _same(errors[group[0]], errors[method]):
-                group.append(method)
-                break
+    sure = curves.keys() - set(plot.failures.method)
+    exact = [m for m, errors in curves.items() if m in sure and errors.max() < 100.0 * ROUNDING]
+    groups: list[list[str]] = []
+    for method in [method for method in curves if method not in exact]:
+        like = [group for group in groups if _same(curves[group[0]], curves[method])]
+        if like:
+            like[0].append(method)
         else:
             groups.append([method])
     sentences = [f"One curve: {', '.join(group)}." for group in groups if len(group) > 1]
@@ -420,26 +378,23 @@ def _alike(plot: Plot) -> str:
     return " ".join(sentences)
 
 
-def _same(one: Mapping[float, float], other: Mapping[float, float]) -> bool:
-    """Say whether two curves are one to the eye: within 1 % at every time step."""
-    shared = one.keys() & other.keys()
-    return bool(shared) and all(
-        abs(one[dt] - other[dt]) <= 0.01 * one[dt] + ROUNDING for dt in shared
-    )
+def _same(one: Any, other: Any) -> bool:
+    """Say whether two series by time step are one to the eye: within 1 % wherever both are."""
+    one, other = one.align(other, join="inner")
+    return len(one) > 0 and bool(((one - other).abs() <= 0.01 * one + ROUNDING).all())
 
 
 def _legend(plots: Sequence[Plot]) -> list[Line2D]:
     """Return the legend's entries: the methods by family, the front, the cross and the limit."""
-    methods = dict.fromkeys(method for plot in plots for method in plot.curves)
+    methods = dict.fromkeys(method for plot in plots for method in plot.curves.method)
     entries: list[Line2D] = []
     for family, title in (("MuJoCo ", "MuJoCo, in C"), ("ours ", "ours, compiled by Numba")):
         own = [method for method in methods if method.startswith(family)]
-        if own:
-            entries.append(Line2D([], [], linestyle="none", label=title))
-            entries += [Line2D([], [], label=m.removeprefix(family), **_line(m)) for m in own]
+        entries += [Line2D([], [], ls="", label=title)] if own else []
+        entries += [Line2D([], [], label=m.removeprefix(family), **_line(m)) for m in own]
     entries.append(Line2D([], [], color=PARETO, lw=9, label="Pareto front: none is better"))
-    dark: dict[str, Any] = {"color": PREDICTION, "linestyle": "none", "markeredgewidth": 2}
-    if any(plot.failures for plot in plots):
+    dark: dict[str, Any] = {"color": PREDICTION, "ls": "", "mew": 2}
+    if any(len(plot.failures) for plot in plots):
         entries.append(Line2D([], [], marker="x", ms=8, label="first to fail", **dark))
     if any(plot.limits_s for plot in plots):
         entries.append(Line2D([], [], marker="|", ms=13, label="predicted to blow up", **dark))

@@ -1,10 +1,10 @@
 """The parallel cube: the report's rigid body and MuJoCo's free joint through the same flights.
 
 Both get the same mass, inertia, start, gravity, keys, lift, damping and torque, and are compared
-with one another and with a **reference**, over time. The reference is a closed form of
-`roller_env.rigid_body.exact` for the linear motion and for every free rotation, and
-`exact.reference` for the rotations under damping or torque; it was compared with a Taylor series in
-40 digits that shares no code with it.
+with one another and with a **reference**, over time: `roller_env.lab.free.FreeScene.truth`, a
+closed form for the linear motion and for every free rotation, and an integration for the rotations
+under damping or torque; it was compared with a Taylor series in 40 digits that shares no code with
+it.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,22 +21,17 @@ from matplotlib.figure import Figure
 from pandas import concat
 
 from roller_env.lab import chart
-from roller_env.lab.free import Acting, FreeScene, Truth, Vector, in_rows
+from roller_env.lab.free import Acting, FreeScene, Vector
 from roller_env.lab.game import GRAVITY_M_S2, LIFT_N, LIFT_S
 from roller_env.lab.methods import Method, MujocoMethod, RigidBodyMethod
 from roller_env.lab.runner import known
-from roller_env.lab.table import Frame, frame, markdown
+from roller_env.lab.table import Frame, markdown
 from roller_env.rigid_body import (
-    LIE_RK4,
-    RK4,
-    RK4_BODY,
-    SPLITTING4,
+    INTEGRATORS,
     Body,
     Integrator,
     PiecewiseConstantForce,
     State,
-    driving_torque,
-    exact,
     key_sequence,
     quaternion,
 )
@@ -56,7 +51,6 @@ MOMENTS: Final = 100
 
 WEIGHT_M_S2: Final[Vector] = (0.0, 0.0, -GRAVITY_M_S2)
 
-
 START_ORIENTATION: Final = (0.8, 0.2, -0.4, 0.4)
 """A unit quaternion with no special direction, so that no axis hides another."""
 
@@ -65,9 +59,6 @@ BODIES: Final[Mapping[str, Body]] = {
     "box": Body.box(size=(0.1, 0.4, 0.9), mass=10.0),
 }
 """The report's cube, and the slender box of the free-body benchmark (scpeters/benchmark)."""
-
-
-FREE: Final = Acting()
 
 
 @dataclass(frozen=True)
@@ -84,7 +75,7 @@ class Flight:
     title: str
     velocity_m_s: Vector
     spin_rad_s: Vector
-    acting: Acting = FREE
+    acting: Acting
 
     def start(self, body: Body) -> State:
         """Return the state in which ``body``, one of `BODIES`, begins."""
@@ -103,32 +94,27 @@ KEYS_HELD: Final = ((0.0, "W"), (1.0, "WA"), (2.5, "A"), (4.0, "SD"), (6.5, "D")
 _LIFT: Final = PiecewiseConstantForce(
     np.array([0.0, LIFT_S]), np.array([(0.0, 0.0, LIFT_N), (0.0, 0.0, 0.0)])
 )
+_WEIGHT: Final = Acting(WEIGHT_M_S2)
 
 FLIGHTS: Final[Mapping[str, Flight]] = {
-    "drift": Flight("drift and spin, no gravity", (-0.9, 0.4, 0.1), (3.0, -5.0, 2.0)),
+    "drift": Flight("drift and spin, no gravity", (-0.9, 0.4, 0.1), (3.0, -5.0, 2.0), Acting()),
     "ballistic": Flight(
-        "thrown, spun about the box's middle axis",
-        (-2.0, 2.0, 8.0),
-        (0.1, 5.0, 0.1),
-        Acting(WEIGHT_M_S2),
+        "thrown, spun about the box's middle axis", (-2.0, 2.0, 8.0), (0.1, 5.0, 0.1), _WEIGHT
     ),
     "keys": Flight(
         "WASD key sequence in free fall",
         (0.0, 0.0, 5.0),
         (2.0, 3.0, -4.0),
-        Acting(WEIGHT_M_S2, held=key_sequence(KEYS_HELD)),
+        replace(_WEIGHT, held=key_sequence(KEYS_HELD)),
     ),
     "lift": Flight(
-        "lift of 12.7 N for 5 s",
-        (0.5, 0.0, 0.0),
-        (-3.0, 1.0, 5.0),
-        Acting(WEIGHT_M_S2, held=_LIFT),
+        "lift of 12.7 N for 5 s", (0.5, 0.0, 0.0), (-3.0, 1.0, 5.0), replace(_WEIGHT, held=_LIFT)
     ),
     "damping": Flight(
         "linear and angular damping",
         (5.0, -3.0, 10.0),
         (4.0, -4.0, 3.0),
-        Acting(WEIGHT_M_S2, drag_n_s_m=0.5, spin_damping_nm_s=0.05),
+        replace(_WEIGHT, drag_n_s_m=0.5, spin_damping_nm_s=0.05),
     ),
     "torque": Flight(
         "the report's torque, (1, 0, 0) - 0.1 omega",
@@ -213,66 +199,21 @@ class Settings:
         """Return a flight of a body as a scene whose moments a step of ``dt_s`` divides."""
         flight = self.flights[name]
         steps = round(self.duration_s / dt_s)
-        moments = max(n for n in range(1, MOMENTS + 1) if steps % n == 0)
         return FreeScene(
             name=name,
             title=flight.title,
             start=flight.start(BODIES[body]),
-            exact=_truth(flight.acting),
             quantities=(),
             time_steps_s=(),
             acting=flight.acting,
             horizon_s=self.duration_s,
-            moments=moments,
+            moments=max(n for n in range(1, MOMENTS + 1) if steps % n == 0),
         )
 
 
 def _whole(steps: float) -> bool:
     # 0.3 / 0.1 is not 3.
     return abs(steps - round(steps)) <= 1e-6
-
-
-def _truth(acting: Acting) -> Truth:
-    """Return the true motion at rising times."""
-
-    def truth(many: State, times_s: Float64) -> State:
-        start = many.take([0])
-        if acting.spin_damping_nm_s or any(acting.torque_nm):
-            turned = _turned(acting, start, times_s)
-        elif start.body.isotropic:
-            turned = exact.constant_spin(many, times_s)
-        else:
-            turned = exact.asymmetric_top(many, times_s)
-        moved = _moved(acting, start, times_s)
-        return turned.recalculate(position=moved.position, momentum=moved.momentum)
-
-    return truth
-
-
-def _turned(acting: Acting, start: State, times_s: Float64) -> State:
-    """Return the rotation under torque and damping, integrated from each moment to the next."""
-    load = driving_torque(acting.torque_nm, acting.spin_damping_nm_s)
-    states = [start]
-    for begin, end in itertools.pairwise([0.0, *times_s.tolist()]):
-        states.append(exact.reference(states[-1], end - begin, load, start_s=begin))
-    return in_rows(states[1:])
-
-
-def _moved(acting: Acting, start: State, times_s: Float64) -> State:
-    """Return the linear motion, a closed form between the jumps of the held force."""
-    end = float(times_s[-1])
-    jumps = [float(t) for t in acting.jumps_s if 0.0 < t < end]
-    weight = start.body.mass[0] * np.array(acting.gravity_m_s2)
-    pieces: list[State] = []
-    for begin, stop in itertools.pairwise([0.0, *jumps, end]):
-        within = times_s[(times_s > begin) & (times_s <= stop)]
-        passed = np.append(within, stop) - begin
-        held = 0.0 if acting.held is None else acting.held.force_at_time(begin)
-        many = start.take([0] * len(passed))
-        reached = exact.linear_drag(many, passed, acting.drag_n_s_m, weight + held)
-        pieces += [reached.take([row]) for row in range(len(within))]
-        start = reached.take([-1])
-    return in_rows(pieces)
 
 
 # --- how far apart ---------------------------------------------------------------------------
@@ -293,7 +234,7 @@ def flown(scene: FreeScene, method: Method, dt_s: float) -> State:
     """Return a flight's moments as rows."""
     trial = scene.trial(method, dt_s)
     trial.run()
-    return trial.reached()
+    return trial.reached
 
 
 def apart(a: State, b: State, gravity_m_s2: Vector) -> dict[str, Float64]:
@@ -328,31 +269,33 @@ def compare(settings: Settings, body: str) -> tuple[Frame, Frame]:
         mine = flown(scene, RigidBodyMethod(settings.ours), settings.dt_s)
         theirs = flown(scene, settings.mujoco, settings.dt_s)
         motions = ((mine, theirs), (mine, scene.truth), (theirs, scene.truth))
-        gravity = flight.acting.gravity_m_s2
-        found = {pair: apart(*two, gravity) for pair, two in zip(PAIRS, motions, strict=True)}
-        largest = {
-            pair: {what: float(values.max()) for what, values in of_pair.items()}
-            for pair, of_pair in found.items()
-        }
-        verdicts.append(_verdict(settings, body, name, largest))
-        for pair, of_pair in found.items():
-            rows = Frame({"time_s": scene.times_s, **of_pair})
-            rows.insert(0, "pair", pair)
-            rows.insert(0, "scene", name)
-            rows.insert(0, "body", body)
-            samples.append(rows)
-    return frame(verdicts), concat(samples, ignore_index=True)
+        largest = []
+        for pair, two in zip(PAIRS, motions, strict=True):
+            found = apart(*two, flight.acting.gravity_m_s2)
+            at = {"body": body, "scene": name, "pair": pair, "time_s": scene.times_s}
+            samples.append(Frame(at | found))
+            largest.append({what: float(values.max()) for what, values in found.items()})
+        verdicts.append({"body": body, "scene": name} | _verdict(settings, *largest))
+    return Frame(verdicts), concat(samples, ignore_index=True)
 
 
 def _verdict(
-    settings: Settings, body: str, scene: str, largest: Mapping[str, Mapping[str, float]]
+    settings: Settings,
+    between: Mapping[str, float],
+    mine: Mapping[str, float],
+    theirs: Mapping[str, float],
 ) -> dict[str, object]:
-    between, mine, theirs = (largest[pair] for pair in PAIRS)
+    """Return the largest differences, and ``agree`` or which side is further from the truth."""
+    ours, mujoco = f"ours {settings.ours.name}", settings.mujoco.name
+    what = "attitude_rad" if between["position_m"] <= AGREEMENT else "position_m"
+    sides, unit = {ours: mine[what], mujoco: theirs[what]}, what.rpartition("_")[2]
+    right, wrong = sorted(sides, key=sides.__getitem__)
+    verdict = f"{wrong} is off by {sides[wrong]:.1e} {unit}, {right} by {sides[right]:.1e}"
+    if max(between["position_m"], between["attitude_rad"]) <= AGREEMENT:
+        verdict = "agree"
     return {
-        "body": body,
-        "scene": scene,
-        "ours": f"ours {settings.ours.name}",
-        "mujoco": settings.mujoco.name,
+        "ours": ours,
+        "mujoco": mujoco,
         "dt_s": settings.dt_s,
         "duration_s": settings.duration_s,
         **between,
@@ -360,32 +303,15 @@ def _verdict(
         "ours_attitude_error_rad": mine["attitude_rad"],
         "mujoco_position_error_m": theirs["position_m"],
         "mujoco_attitude_error_rad": theirs["attitude_rad"],
-        "verdict": _words(settings, between, mine, theirs),
+        "verdict": verdict,
     }
 
 
-def _words(
-    settings: Settings,
-    between: Mapping[str, float],
-    mine: Mapping[str, float],
-    theirs: Mapping[str, float],
-) -> str:
-    """Return ``agree``, or which side is further from the truth, by what and how much."""
-    what, unit = (
-        ("attitude_rad", "rad") if between["position_m"] <= AGREEMENT else ("position_m", "m")
-    )
-    if max(between["position_m"], between["attitude_rad"]) <= AGREEMENT:
-        return "agree"
-    sides = {f"ours {settings.ours.name}": mine[what], settings.mujoco.name: theirs[what]}
-    right, wrong = sorted(sides, key=sides.__getitem__)
-    return f"{wrong} is off by {sides[wrong]:.1e} {unit}, {right} by {sides[right]:.1e}"
-
-
-REMEDIES: Final[Mapping[str, tuple[Integrator, str]]] = {
-    "rk4": (RK4, "the report's: momentum, world axes"),
-    "lie_rk4": (LIE_RK4, "turns instead of sums of quaternions"),
-    "rk4_body": (RK4_BODY, "body axes instead of world axes"),
-    "splitting4": (SPLITTING4, "exact turns about body axes"),
+REMEDIES: Final[Mapping[str, str]] = {
+    "rk4": "the report's: momentum, world axes",
+    "lie_rk4": "turns instead of sums of quaternions",
+    "rk4_body": "body axes instead of world axes",
+    "splitting4": "exact turns about body axes",
 }
 """The report's method and what could mend it, each with the one thing that it exchanges."""
 
@@ -396,28 +322,27 @@ def remedies(settings: Settings, body: str) -> Iterator[Frame]:
     Columns: body, scene, method, dt_s, against_mujoco_rad, error_rad, mujoco_error_rad; the
     largest angles of a flight.
     """
-    methods = {settings.ours.name: settings.ours}
-    methods |= {name: method for name, (method, _) in REMEDIES.items()}
+    names = dict.fromkeys((settings.ours.name, *REMEDIES))
     steps_s = settings.steps_s()
     for dt_s in steps_s:
         rows = []
         for name in settings.flights:
             scene = settings.scene(body, name, steps_s[0])
             theirs = flown(scene, settings.mujoco, dt_s)
-            for method in methods.values():
-                mine = flown(scene, RigidBodyMethod(method), dt_s)
+            for method in names:
+                mine = flown(scene, RigidBodyMethod(INTEGRATORS[method]), dt_s)
                 rows.append(
                     {
                         "body": body,
                         "scene": name,
-                        "method": method.name,
+                        "method": method,
                         "dt_s": dt_s,
                         "against_mujoco_rad": _angle(mine, theirs),
                         "error_rad": _angle(mine, scene.truth),
                         "mujoco_error_rad": _angle(theirs, scene.truth),
                     }
                 )
-        yield frame(rows)
+        yield Frame(rows)
 
 
 def _angle(a: State, b: State) -> float:
@@ -428,7 +353,7 @@ def verdict_table(verdicts: Frame) -> str:
     """Return the largest differences and who is wrong, for people, as Markdown."""
     columns = ["body", "scene", *QUANTITIES, "verdict"]
     titles = ["body", "scene", *QUANTITIES.values(), "verdict"]
-    return markdown(titles, verdicts[columns].values.tolist())
+    return markdown(titles, verdicts[columns].to_numpy().tolist())
 
 
 def remedy_table(rows: Frame) -> str:
@@ -445,6 +370,7 @@ _FLOOR: Final = 1e-17
 """Differences below this, nearly always exactly 0, leave the picture."""
 
 
+@chart.styled
 def draw_flights(settings: Settings, body: str, samples: Frame) -> Figure:
     """Draw the differences over time: a row for each scene, a panel for each quantity."""
     figure, panels = chart.grid(
@@ -456,29 +382,35 @@ def draw_flights(settings: Settings, body: str, samples: Frame) -> Figure:
         panel=(3.0, 2.1),
         sharey="col",
     )
-    lines = (
-        ("ours - reference", "our own error", chart.colour(f"ours {settings.ours.name}"), 3.6),
-        ("MuJoCo - reference", "MuJoCo's own error", chart.colour(settings.mujoco.name), 3.6),
-        ("ours - MuJoCo", "difference between the two", "#222222", 1.1),
-    )
-    for row, name in zip(panels, settings.flights, strict=True):
-        mine = samples[samples.scene == name]
-        for axes, what in zip(row, QUANTITIES, strict=True):
+    ours, theirs = chart.colour(f"ours {settings.ours.name}"), chart.colour(settings.mujoco.name)
+    lines: dict[str, dict[str, Any]] = {
+        "ours - reference": {"label": "our own error", "color": ours, "lw": 3.6, "alpha": 0.7},
+        "MuJoCo - reference": {"label": "MuJoCo's own error", "color": theirs, "lw": 3.6},
+        "ours - MuJoCo": {"label": "difference between the two", "color": "#222222", "lw": 1.1},
+    }
+    lines["MuJoCo - reference"]["alpha"] = 0.7
+    shown = samples[list(QUANTITIES)].where(samples[list(QUANTITIES)] > _FLOOR)
+    samples = samples[["scene", "pair", "time_s"]].join(shown)
+    for row, (name, flight) in zip(panels, settings.flights.items(), strict=True):
+        row[0].set_ylabel(flight.title, fontsize=8)
+        for axes, (what, title) in zip(row, QUANTITIES.items(), strict=True):
             if what in REFERENCE_ERROR:
                 axes.axhspan(_FLOOR, REFERENCE_ERROR[what], color="#efefef", lw=0)
-                axes.axhline(AGREEMENT, color="#555555", lw=1.0, ls="--", label="agree to 1e-9")
-            for pair, label, colour, width in lines:
-                one = mine[mine.pair == pair]
-                shown = one[what].where(one[what] > _FLOOR)
-                alpha = 0.7 if width > 2.0 else 1.0
-                axes.plot(one.time_s, shown, color=colour, lw=width, alpha=alpha, label=label)
+                _draw_agreement(axes)
+            for pair, style in lines.items():
+                one = samples[(samples.scene == name) & (samples.pair == pair)]
+                axes.plot(one.time_s, one[what], **style)
             axes.set(yscale="log", xlim=(0.0, settings.duration_s))
-            axes.set_title(QUANTITIES[what], fontsize=9, color="#555555", loc="left")
-        row[0].set_ylabel(settings.flights[name].title, fontsize=8)
+            axes.set_title(title, fontsize=9, color="#555555", loc="left")
     chart.legend_of(figure, panels[0, 1])
     return figure
 
 
+def _draw_agreement(axes: Axes) -> None:
+    axes.axhline(AGREEMENT, color="#555555", lw=1.0, ls="--", label="agree to 1e-9")
+
+
+@chart.styled
 def draw_remedies(settings: Settings, body: str, rows: Frame) -> Figure:
     """Draw the attitude error against the time step: a panel for each scene, a line a method."""
     columns = min(3, len(settings.flights))
@@ -493,36 +425,21 @@ def draw_remedies(settings: Settings, body: str, rows: Frame) -> Figure:
         if name is None:
             axes.set_visible(False)
             continue
-        _draw_remedies_of(axes, settings, rows[rows.scene == name])
+        own = rows[rows.scene == name].assign(ms=1e3 * rows.dt_s)
+        theirs, mujoco = own.drop_duplicates("ms"), settings.mujoco.name
+        style: dict[str, Any] = {"lw": 5, "alpha": 0.5, "color": chart.colour(mujoco)}
+        axes.plot(theirs.ms, theirs.mujoco_error_rad, label=mujoco, **style)
+        for method, mine in own.groupby("method", sort=False):
+            label = f"{method}: {REMEDIES[method]}" if method in REMEDIES else method
+            style = {"ms": 4, "color": chart.colour(f"ours {method}"), "label": label}
+            axes.plot(mine.ms, mine.error_rad, "o-", **style)
+        _draw_agreement(axes)
+        axes.set(xscale="log", yscale="log")
+        axes.set_xticks(theirs.ms, [f"{ms:g}" for ms in theirs.ms])
+        axes.minorticks_off()
         axes.set_title(settings.flights[name].title, fontsize=10, loc="left")
     chart.legend_of(figure, panels[0, 0])
     return figure
-
-
-def _draw_remedies_of(axes: Axes, settings: Settings, rows: Frame) -> None:
-    theirs, name = rows.drop_duplicates("dt_s"), settings.mujoco.name
-    axes.plot(
-        1e3 * theirs.dt_s,
-        theirs.mujoco_error_rad,
-        color=chart.colour(name),
-        lw=5,
-        alpha=0.5,
-        label=name,
-    )
-    for method, mine in rows.groupby("method", sort=False):
-        label = f"{method}: {REMEDIES[method][1]}" if method in REMEDIES else method
-        axes.plot(
-            1e3 * mine.dt_s,
-            mine.error_rad,
-            "o-",
-            ms=4,
-            color=chart.colour(f"ours {method}"),
-            label=label,
-        )
-    axes.axhline(AGREEMENT, color="#555555", lw=1.0, ls="--", label="agree to 1e-9")
-    axes.set(xscale="log", yscale="log")
-    axes.set_xticks(1e3 * theirs.dt_s, [f"{1e3 * dt:g}" for dt in theirs.dt_s])
-    axes.minorticks_off()
 
 
 def chosen(what: str, name: str, names: Sequence[str]) -> tuple[str, ...]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import platform
-import statistics
 import sys
 import time
 from abc import ABC, abstractmethod
@@ -23,34 +22,12 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from pandas import DataFrame as Frame
 
 from roller_env import __version__
 
 REPEATS: Final = 7
 """Repetitions of which the median is taken."""
-
-
-@dataclass(frozen=True, slots=True)
-class Median:
-    """A median over rounds, with the smallest and the largest."""
-
-    value: float
-    low: float
-    high: float
-
-    @staticmethod
-    def of(values: Sequence[float]) -> Median:
-        """Return the median of at least one value."""
-        return Median(statistics.median(values), min(values), max(values))
-
-    @property
-    def spread(self) -> float:
-        """(largest - smallest) / median: how far the machine can be believed."""
-        return (self.high - self.low) / self.value
-
-    def times(self, factor: float) -> Median:
-        """Return it in another unit."""
-        return Median(self.value * factor, self.low * factor, self.high * factor)
 
 
 def timed(work: Callable[[], object], clock: Callable[[], float] = time.perf_counter) -> float:
@@ -60,19 +37,19 @@ def timed(work: Callable[[], object], clock: Callable[[], float] = time.perf_cou
     return clock() - start
 
 
-def cpu_time(work: Callable[[], object], repeats: int = REPEATS) -> Median:
+def cpu_seconds(work: Callable[[], object], repeats: int = REPEATS) -> list[float]:
     """Do ``work`` once to warm the caches and then ``repeats`` times; return CPU seconds.
 
     They are this thread's own: of work in one thread, on a quiet machine, the wall time, and on a
     busy one still the work's.
-
-    Raises:
-        ValueError: fewer repetitions than one.
     """
-    if repeats < 1:
-        raise ValueError(f"repeats: found {repeats}; at least 1")
     work()
-    return Median.of([timed(work, time.thread_time) for _ in range(repeats)])
+    return [timed(work, time.thread_time) for _ in range(repeats)]
+
+
+def spread(values: Sequence[float]) -> float:
+    """Return (largest - smallest) / median: how far the machine can be believed."""
+    return float(np.ptp(values) / np.median(values))
 
 
 def interleaved(
@@ -157,44 +134,21 @@ class Case(ABC):
         """Raise if what was timed was not what should have been."""
 
 
-@dataclass(frozen=True, slots=True)
-class Result:
-    """What one benchmark case did: the seconds of one environment step, round by round."""
+def compare(cases: Sequence[Case], config: Config) -> Frame:
+    """Let cases take turns; a case that follows another stands behind it.
 
-    case: Case
-    seconds: tuple[float, ...]
-
-    @property
-    def env_steps_per_s(self) -> Median:
-        """Environment steps a wall second."""
-        return Median.of([1.0 / seconds for seconds in self.seconds])
-
-
-def compare(cases: Sequence[Case], config: Config) -> dict[str, Result]:
-    """Let cases take turns, round by round; return the results by name.
-
-    A case that follows another stands behind it.
+    Returns:
+        (rounds, cases) wall seconds of one environment step, by the cases' names.
     """
     steps = {case.name: case.prepare(config) for case in cases}
 
     def turn(case: Case) -> float:
         return case.run(steps[case.name]) / (steps[case.name] * case.env_steps)
 
-    turns = {case.name: partial(turn, case) for case in cases}
-    seconds = interleaved(turns, config.rounds)
+    seconds = interleaved({case.name: partial(turn, case) for case in cases}, config.rounds)
     for case in cases:
         case.verify()
-    return {case.name: Result(case, seconds[case.name]) for case in cases}
-
-
-def speed_ratio(ours: Result, theirs: Result) -> Median:
-    """Return how many environment steps ``ours`` does while ``theirs`` does one."""
-    return Median.of([b / a for a, b in zip(ours.seconds, theirs.seconds, strict=True)])
-
-
-def simulated_ratio(ours: Result, theirs: Result) -> Median:
-    """Return how much simulated time ``ours`` passes while ``theirs`` passes one second."""
-    return speed_ratio(ours, theirs).times(ours.case.simulated_s / theirs.case.simulated_s)
+    return Frame(seconds)
 
 
 # --- provenance ------------------------------------------------------------------------------
@@ -226,11 +180,9 @@ def header(facts: Mapping[str, str]) -> str:
 
 
 def _processor() -> str:
-    if _CPU_INFO.exists():
-        for line in _CPU_INFO.read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
+    lines = _CPU_INFO.read_text(encoding="utf-8").splitlines() if _CPU_INFO.exists() else []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return models[0] if models else platform.processor() or platform.machine()
 
 
 def _version(name: str) -> str:
@@ -238,9 +190,6 @@ def _version(name: str) -> str:
         return version(name)
     except PackageNotFoundError:
         return "not installed"
-
-
-# --- names -----------------------------------------------------------------------------------
 
 
 def known(what: str, name: str, names: Sequence[str]) -> str:

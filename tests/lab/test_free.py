@@ -146,13 +146,12 @@ def test_implicitfast_loses_a_tumbling_boxs_energy_and_euler_gains_it() -> None:
         COMPLEX_BOX,
         start=State.create(BENCHMARK_BOX, angular_velocity=(0.1, 5.0, 0.1)),
         acting=Acting(),
-        exact=exact.asymmetric_top,
     )
 
     def energy_ratio(method: MujocoMethod) -> float:
         trial = weightless.trial(method, 1e-3)
         trial.run()
-        before, after = weightless.start.kinetic_energy(), trial.reached().kinetic_energy()
+        before, after = weightless.start.kinetic_energy(), trial.reached.kinetic_energy()
         return float(after[-1] / before[0])
 
     assert energy_ratio(MujocoMethod("Euler")) == pytest.approx(1.024, abs=0.002)
