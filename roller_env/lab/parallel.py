@@ -380,6 +380,7 @@ def draw_flights(settings: Settings, body: str, samples: Frame) -> Figure:
         "Thick: how far each side is from the reference. Thin: how far they are from one another; "
         "where a line is missing, it is 0 (under 1e-17).",
         panel=(3.0, 2.1),
+        margins=(0.9, 0.5, 1.0, 1.0),
         sharey="col",
     )
     ours, theirs = chart.colour(f"ours {settings.ours.name}"), chart.colour(settings.mujoco.name)
@@ -419,6 +420,7 @@ def draw_remedies(settings: Settings, body: str, rows: Frame) -> Figure:
         f"The {body}: which part of the report's method makes its error",
         f"largest attitude error in {settings.duration_s:g} s, rad, against the time step, ms",
         panel=(4.6, 3.2),
+        margins=(0.9, 0.5, 1.0, 1.0),
         sharey="all",
     )
     for axes, name in itertools.zip_longest(panels.ravel(), settings.flights):

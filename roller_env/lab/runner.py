@@ -133,6 +133,9 @@ class Case(ABC):
     def verify(self) -> None:  # noqa: B027 - most have nothing to verify
         """Raise if what was timed was not what should have been."""
 
+    def close(self) -> None:  # noqa: B027 - most hold nothing
+        """Give back what it holds, such as processes."""
+
 
 def compare(cases: Sequence[Case], config: Config) -> Frame:
     """Let cases take turns; a case that follows another stands behind it.

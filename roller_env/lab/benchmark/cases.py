@@ -9,9 +9,10 @@ steps, which makes physics alone faster than one would find it.
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Iterator, Mapping
-from types import TracebackType
-from typing import Any, Final, NamedTuple, Self
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any, Final
 
 import gymnasium as gym
 import mujoco
@@ -44,10 +45,6 @@ SEED: Final = 0
 STATE: Final = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
-class ReplayError(RuntimeError):
-    """The physics alone did not go where the game went, so its time says nothing."""
-
-
 def check_options(options: Mapping[str, Any]) -> None:
     """Raise what making an environment with these options would raise, before anything runs.
 
@@ -72,21 +69,30 @@ class Game(Case):
     """An environment of ours under random keys; what stands behind it does its physics again.
 
     Attributes:
+        simulation: what it plays in.
         options: those of `roller_env.config.EnvConfig`.
         steps_a_round: of the interleaved run; 0 before `prepare`.
     """
 
-    simulation: Simulation
-
-    def __init__(self, name: str, num_envs: int, options: Mapping[str, Any]) -> None:
-        self.options, self.steps_a_round = dict(options), 0
+    def __init__(
+        self, name: str, num_envs: int, simulation: Simulation, options: Mapping[str, Any]
+    ) -> None:
+        self.simulation, self.options, self.steps_a_round = simulation, dict(options), 0
         self._actions = random_actions(num_envs)
-        super().__init__(name, num_envs, self.simulation.duration_s)
+        super().__init__(name, num_envs, simulation.duration_s)
 
     def prepare(self, config: Config) -> int:
         """Warm up, and return the steps of one round."""
         self.steps_a_round = super().prepare(config)
         return self.steps_a_round
+
+    def _run(self, steps: int) -> float:
+        actions = [next(self._actions) for _ in range(steps)]
+        return timed(partial(self._play, actions))
+
+    @abstractmethod
+    def _play(self, actions: Sequence[Int64]) -> None:
+        """Step once an action."""
 
 
 class VectorStep(Game):
@@ -97,18 +103,12 @@ class VectorStep(Game):
         options = {"num_threads": num_threads, **options}
         self._env = RollerVectorEnv(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **options)
         self._env.reset(seed=SEED)
-        self.simulation = self._env.simulation
-        super().__init__(name, num_envs, options)
+        super().__init__(name, num_envs, self._env.simulation, options)
 
-    def _run(self, steps: int) -> float:
-        actions = [next(self._actions) for _ in range(steps)]
+    def _play(self, actions: Sequence[Int64]) -> None:
         step = self._env.step
-
-        def play() -> None:
-            for action in actions:
-                step(action)
-
-        return timed(play)
+        for action in actions:
+            step(action)
 
 
 class SingleStep(Game):
@@ -121,37 +121,17 @@ class SingleStep(Game):
         self._env.reset(seed=SEED)
         game = self._env.unwrapped
         assert isinstance(game, RollerEnv)
-        self.simulation = game.simulation
-        super().__init__(name, 1, options)
+        super().__init__(name, 1, game.simulation, options)
 
-    def _run(self, steps: int) -> float:
-        actions = [next(self._actions)[0] for _ in range(steps)]
+    def _play(self, actions: Sequence[Int64]) -> None:
         env = self._env
-
-        def play() -> None:
-            for action in actions:
-                _, _, terminated, truncated, _ = env.step(action)
-                if terminated or truncated:
-                    env.reset()
-
-        return timed(play)
+        for action in actions:
+            _, _, terminated, truncated, _ = env.step(action[0])
+            if terminated or truncated:
+                env.reset()
 
 
 # --- physics alone ---------------------------------------------------------------------------
-
-
-class _RecordedStep(NamedTuple):
-    """What one control step's physics depends on.
-
-    Attributes:
-        control: (N, nu) the actuators' controls during the step.
-        ended: (n,) rows whose episode it ended.
-        fresh: (n, nstate) the integration states that those rows were put into after it.
-    """
-
-    control: Float64
-    ended: Int64
-    fresh: Float64
 
 
 class PhysicsAlone(Case):
@@ -160,9 +140,8 @@ class PhysicsAlone(Case):
     def __init__(self, name: str, leader: Game) -> None:
         """Do what ``leader`` does, behind it."""
         count = leader.env_steps
-        options = leader.options
         self._leader, self._actions = leader, random_actions(count)
-        self._env = RollerVectorEnv(count, autoreset_mode=AutoresetMode.DISABLED, **options)
+        self._env = RollerVectorEnv(count, autoreset_mode=AutoresetMode.DISABLED, **leader.options)
         self._env.reset(seed=SEED)
         self.model: mujoco.MjModel = self._env.simulation.compiled.model
         self.substeps = self._env.config.substeps
@@ -181,32 +160,50 @@ class PhysicsAlone(Case):
     def _states(self) -> Float64:
         return self._env.simulation.snapshot().physics
 
-    def _recorded(self, steps: int) -> list[_RecordedStep]:
-        return [self._record_step() for _ in range(steps)]
+    def _record_step(self) -> tuple[Float64, Int64, Float64]:
+        """Return what one control step's physics depends on.
 
-    def _record_step(self) -> _RecordedStep:
+        (N, nu) the actuators' controls during it, (n,) rows whose episode it ended, and (n, nstate)
+        the integration states that those rows were put into after it.
+        """
         _, _, terminated, truncated, _ = self._env.step(next(self._actions))
-        control = self._states[:, self._control].copy()
-        over = terminated | truncated
+        control, over = self._states[:, self._control].copy(), terminated | truncated
         rows = np.flatnonzero(over)
         if len(rows):
             self._env.reset(options={"reset_mask": over})
-        return _RecordedStep(control, rows, self._env.simulation.snapshot(rows).physics)
+        return control, rows, self._env.simulation.snapshot(rows).physics
 
+    def _run(self, steps: int) -> float:
+        seconds = 0.0
+        for control, ended, fresh in [self._record_step() for _ in range(steps)]:
+            with profiler_off():
+                seconds += self._step(control)
+            if len(ended):
+                self._put(ended, fresh)
+        return seconds
+
+    @abstractmethod
+    def _step(self, control: Float64) -> float:
+        """Do a control step's physics, and return the seconds that it took."""
+
+    @abstractmethod
+    def _put(self, rows: Int64, states: Float64) -> None:
+        """Put rows into integration states, (n, nstate)."""
+
+    @abstractmethod
     def _reached(self) -> Float64:
         """Return the integration states, (N, nstate)."""
-        raise NotImplementedError
 
     def verify(self) -> None:
         """Raise unless every ball is, to the bit, where the leader's is.
 
         Raises:
-            ReplayError: one is not.
+            RuntimeError: one is not, so that its time says nothing.
         """
         theirs = self._leader.simulation.snapshot().physics
         wrong = np.flatnonzero((self._reached() != theirs).any(axis=1))
         if len(wrong):
-            raise ReplayError(
+            raise RuntimeError(
                 f"{self.name}: after {self._leader.steps_done} steps row(s) {wrong[:5].tolist()} "
                 f"are not where those of {self._leader.name} are; the two did not do the same work"
             )
@@ -225,16 +222,13 @@ class BatchAlone(PhysicsAlone):
         self._batch.state[:] = self._states
         self._ctrl = self._batch.bind("ctrl")
 
-    def _run(self, steps: int) -> float:
-        seconds = 0.0
-        for recorded in self._recorded(steps):
-            self._ctrl[:] = recorded.control
-            with profiler_off():
-                seconds += timed(lambda: self._batch.step(nstep=self.substeps))
-            if len(recorded.ended):
-                self._batch.reset(recorded.ended, stage=mujoco.mjtStage.mjSTAGE_NONE)
-                self._batch.state[recorded.ended] = recorded.fresh
-        return seconds
+    def _step(self, control: Float64) -> float:
+        self._ctrl[:] = control
+        return timed(lambda: self._batch.step(nstep=self.substeps))
+
+    def _put(self, rows: Int64, states: Float64) -> None:
+        self._batch.reset(rows, stage=mujoco.mjtStage.mjSTAGE_NONE)
+        self._batch.state[rows] = states
 
     def _reached(self) -> Float64:
         return np.asarray(self._batch.state)
@@ -247,28 +241,21 @@ class BareLoop(PhysicsAlone):
         """Do what ``leader`` does, behind it."""
         super().__init__(name, leader)
         self._data = mujoco.MjData(self.model)
-        self._put(self._states[0])
+        self._put(np.zeros(1, np.int64), self._states)
 
-    def _run(self, steps: int) -> float:
-        model, data, seconds = self.model, self._data, 0.0
-        substeps = range(self.substeps)
-        for recorded in self._recorded(steps):
-            control = recorded.control[0]
+    def _step(self, control: Float64) -> float:
+        model, data, substeps, now = self.model, self._data, range(self.substeps), control[0]
 
-            def loop(control: Float64 = control) -> None:
-                data.ctrl[:] = control
-                for _ in substeps:
-                    mujoco.mj_step(model, data)
+        def loop() -> None:
+            data.ctrl[:] = now
+            for _ in substeps:
+                mujoco.mj_step(model, data)
 
-            with profiler_off():
-                seconds += timed(loop)
-            if len(recorded.ended):
-                self._put(recorded.fresh[0])
-        return seconds
+        return timed(loop)
 
-    def _put(self, state: Float64) -> None:
+    def _put(self, rows: Int64, states: Float64) -> None:
         mujoco.mj_resetData(self.model, self._data)
-        mujoco.mj_setState(self.model, self._data, state, STATE)
+        mujoco.mj_setState(self.model, self._data, states[0], STATE)
 
     def _reached(self) -> Float64:
         state = np.empty((1, mujoco.mj_stateSize(self.model, STATE)))
@@ -293,16 +280,7 @@ class Training(Case):
         self._model = model
         super().__init__(name, model.n_envs * model.n_steps, simulated_s)
 
-    def __enter__(self) -> Self:
-        """Return the training."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         """Close the environments, which may be processes."""
         assert self._model.env is not None
         self._model.env.close()
@@ -347,11 +325,12 @@ def as_make_train_does(name: str, config: TrainingConfig) -> Training:
 
 def _ppo(environments: VecEnv) -> PPO:
     torch.set_num_threads(1)
+    batch = environments.num_envs * _ROLLOUT_STEPS // _BATCHES
     return PPO(
         "MlpPolicy",
         environments,
         n_steps=_ROLLOUT_STEPS,
-        batch_size=environments.num_envs * _ROLLOUT_STEPS // _BATCHES,
+        batch_size=batch,
         n_epochs=_EPOCHS,
         seed=SEED,
         device="cpu",

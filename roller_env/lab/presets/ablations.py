@@ -2,41 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Final, Literal
 
 import mujoco
 import numpy as np
 
-from roller_env.compile.mjcf import BALL, build_spec
 from roller_env.lab.benchmark.scale import level_of_boxes
 from roller_env.lab.presets.results import Games, costs
-from roller_env.lab.presets.setting import pair_with_ball, set_flag
-from roller_env.lab.table import Frame, frame
+from roller_env.lab.presets.setting import Setting
+from roller_env.lab.table import Frame
 from roller_env.level import Level, load_level
 from roller_env.level.expand import coin_positions, solids
-from roller_env.physics.presets import PRESETS
 
 Change = Callable[[mujoco.MjSpec, Level], None]
+Way = tuple[Setting, Change | None]
+"""How a level is modelled: a setting, and what is then changed of the model."""
 
 
-def _as_chosen(_spec: mujoco.MjSpec, _level: Level) -> None:
-    pass
-
-
-def _flag(name: str, on: bool) -> Change:
-    def change(spec: mujoco.MjSpec, _level: Level) -> None:
-        set_flag(spec.option, name, on)
-
-    return change
+def _flags(**flags: bool) -> Setting:
+    return Setting("", "flags", flags=tuple(flags.items()))
 
 
 def _unmerged(spec: mujoco.MjSpec, level: Level) -> None:
     """Have every box of the level and every cell of its floors be a geom."""
     merged = [geom for geom in spec.geoms if geom.name.startswith("solid_")]
     materials = {geom.name.split("_", 2)[2]: geom for geom in merged}
+    same = ("contype", "conaffinity", "priority", "condim", "friction", "solref", "solimp")
     for number, solid in enumerate(solids(level)):
-        like = materials[solid.material]
         quaternion = np.empty(4)
         mujoco.mju_mat2Quat(quaternion, np.array(solid.rotation).reshape(9))
         spec.worldbody.add_geom(
@@ -45,13 +38,7 @@ def _unmerged(spec: mujoco.MjSpec, level: Level) -> None:
             size=solid.half_size,
             pos=solid.centre,
             quat=quaternion,
-            contype=like.contype,
-            conaffinity=like.conaffinity,
-            priority=like.priority,
-            condim=like.condim,
-            friction=like.friction,
-            solref=like.solref,
-            solimp=like.solimp,
+            **{name: getattr(materials[solid.material], name) for name in same},
         )
     for geom in merged:
         spec.delete(geom)
@@ -63,80 +50,55 @@ def _no_contact_bits(spec: mujoco.MjSpec, _level: Level) -> None:
         geom.contype = geom.conaffinity = 1
 
 
-def _pairs(spec: mujoco.MjSpec, _level: Level) -> None:
-    for geom in spec.geoms:
-        if geom.name != BALL:
-            pair_with_ball(spec, geom)
-    spec.geom(BALL).contype = 0
-
-
-def _fixed_movers(spec: mujoco.MjSpec, level: Level) -> None:
-    for name in _movers(level):
-        spec.delete(spec.actuator(name))
-        spec.delete(spec.joint(name))
-
-
-def _no_movers(spec: mujoco.MjSpec, level: Level) -> None:
-    for name in _movers(level):
-        spec.delete(spec.actuator(name))
-        spec.delete(spec.body(name))
-
-
-def _movers(level: Level) -> list[str]:
-    return [*(plate.name for plate in level.plates), *(gate.name for gate in level.gates)]
-
-
-def _coins(as_geoms: bool) -> Change:
+def _without_movers(part: Literal["joint", "body"]) -> Change:
     def change(spec: mujoco.MjSpec, level: Level) -> None:
-        radius = level.ball.radius / 2
-        for number, coin in enumerate(coin_positions(level)[0]):
-            if as_geoms:
-                spec.worldbody.add_geom(
-                    name=f"coin_{number}",
-                    type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-                    size=[radius, radius / 4, 0.0],
-                    pos=coin,
-                    contype=0,
-                    conaffinity=0,
-                )
-            else:
-                spec.worldbody.add_site(name=f"coin_{number}", size=[radius] * 3, pos=coin)
+        for name in (*(one.name for one in level.plates), *(one.name for one in level.gates)):
+            spec.delete(spec.actuator(name))
+            spec.delete(getattr(spec, part)(name))
 
     return change
 
 
-def _cells(spec: mujoco.MjSpec, level: Level) -> None:
-    """Leave floors unmerged, with what the compiler does for levels of so many geoms."""
-    _unmerged(spec, level)
-    set_flag(spec.option, "midphase", True)
+def _coins(level: Level) -> Iterator[tuple[str, np.ndarray, float]]:
+    """Yield each coin's name, place and radius, m."""
+    for number, place in enumerate(coin_positions(level)[0]):
+        yield f"coin_{number}", place, level.ball.radius / 2
+
+
+def _coin_geoms(spec: mujoco.MjSpec, level: Level) -> None:
+    shape = mujoco.mjtGeom.mjGEOM_CYLINDER
+    for name, place, r in _coins(level):
+        geom = spec.worldbody.add_geom(name=name, type=shape, size=[r, r / 4, 0.0], pos=place)
+        geom.contype = geom.conaffinity = 0
+
+
+def _coin_sites(spec: mujoco.MjSpec, level: Level) -> None:
+    for name, place, r in _coins(level):
+        spec.worldbody.add_site(name=name, size=[r] * 3, pos=place)
 
 
 AS_CHOSEN: Final = "as compiled"
-CLASSIC: Final[dict[str, Change]] = {
-    AS_CHOSEN: _as_chosen,
-    "every floor cell a geom": _cells,
-    "no contact bits: all may touch all": _no_contact_bits,
-    "explicit pairs instead of contact bits": _pairs,
-    "coins as geoms": _coins(as_geoms=True),
-    "coins as sites": _coins(as_geoms=False),
-    "constraint islands on": _flag("island", True),
-    "midphase on": _flag("midphase", True),
-    "fixed geoms posed in every step": _flag("sleep", False),
-    "plate and gate without joints": _fixed_movers,
-    "no plate, no gate": _no_movers,
+_CHOSEN: Final = _flags()
+CLASSIC: Final[Mapping[str, Way]] = {
+    AS_CHOSEN: (_CHOSEN, None),
+    # With what the compiler does for levels of so many geoms.
+    "every floor cell a geom": (_flags(midphase=True), _unmerged),
+    "no contact bits: all may touch all": (_CHOSEN, _no_contact_bits),
+    "explicit pairs instead of contact bits": (Setting("", "contacts", pairs=True), None),
+    "coins as geoms": (_CHOSEN, _coin_geoms),
+    "coins as sites": (_CHOSEN, _coin_sites),
+    "constraint islands on": (_flags(island=True), None),
+    "midphase on": (_flags(midphase=True), None),
+    "fixed geoms posed in every step": (_flags(sleep=False), None),
+    "plate and gate without joints": (_CHOSEN, _without_movers("joint")),
+    "no plate, no gate": (_CHOSEN, _without_movers("body")),
 }
 """Ways to model the classic level."""
 
-
-def _plain(spec: mujoco.MjSpec, _level: Level) -> None:
-    set_flag(spec.option, "sleep", False)
-    set_flag(spec.option, "midphase", False)
-
-
-_SIZES: Final[dict[str, Change]] = {
-    AS_CHOSEN: _as_chosen,
-    "fixed geoms posed in every step": _flag("sleep", False),
-    "neither midphase nor posed once": _plain,
+_SIZES: Final[Mapping[str, Way]] = {
+    AS_CHOSEN: (_CHOSEN, None),
+    "fixed geoms posed in every step": (_flags(sleep=False), None),
+    "neither midphase nor posed once": (_flags(sleep=False, midphase=False), None),
 }
 """Ways to model levels of many boxes."""
 
@@ -150,44 +112,28 @@ def measure(rounds: int, boxes: Sequence[int], games: int) -> Frame:
         games: that are stepped together.
 
     Returns:
-        ``boxes`` (0 for the classic level), ``what`` is modelled otherwise, ``chosen`` (as the
-        compiler does it), ``geoms``, ``us_per_step`` (CPU, median) with its ``spread``, and
+        ``what`` is modelled otherwise, ``chosen`` (as the compiler does it), ``boxes`` (0 for the
+        classic level), ``geoms``, ``us_per_step`` (CPU, median) with its ``spread``, and
         ``same_bits``: whether the ball's way is the chosen model's, to the bit.
     """
-    rows = _compared({0: (load_level("classic"), CLASSIC)}, rounds, games)
-    sizes = {count: (level_of_boxes(count), _SIZES) for count in boxes}
-    return frame(rows + _compared(sizes, rounds, games))
-
-
-def _compared(
-    levels: Mapping[int, tuple[Level, Mapping[str, Change]]], rounds: int, games: int
-) -> list[dict[str, Any]]:
-    """Let every way to model each level, by the number of its boxes, take turns."""
-    models, played = {}, {}
-    for boxes, (level, changes) in levels.items():
-        for what, change in changes.items():
-            model = _model(level, change)
-            models[boxes, what] = model
-            played[f"{boxes} {what}"] = Games(model, level.start.at, games)
-    taken = costs(played, rounds)
-    balls = {boxes: played[f"{boxes} {AS_CHOSEN}"].ball for boxes in levels}
-    return [
-        {
-            "what": what,
-            "chosen": what == AS_CHOSEN,
-            "boxes": boxes,
-            "geoms": model.ngeom,
-            "us_per_step": 1e6 * taken[f"{boxes} {what}"].value,
-            "spread": taken[f"{boxes} {what}"].spread,
-            "same_bits": bool(np.array_equal(played[f"{boxes} {what}"].ball, balls[boxes])),
+    rows = []
+    for of_boxes in ({0: load_level("classic")}, {n: level_of_boxes(n) for n in boxes}):
+        played = {
+            (count, what): Games(_model(level, way), level.start.at, games)
+            for count, level in of_boxes.items()
+            for what, way in (_SIZES if count else CLASSIC).items()
         }
-        for (boxes, what), model in models.items()
-    ]
+        taken = costs({f"{count} {what}": one for (count, what), one in played.items()}, rounds)
+        for (count, what), one in played.items():
+            row = {"what": what, "chosen": what == AS_CHOSEN, "boxes": count}
+            same = np.array_equal(one.ball, played[count, AS_CHOSEN].ball)
+            rows.append(row | {"geoms": one.geoms} | taken[f"{count} {what}"] | {"same_bits": same})
+    return Frame(rows)
 
 
-def _model(level: Level, change: Change) -> mujoco.MjModel:
-    spec = build_spec(level, PRESETS["default"])
-    change(spec, level)
-    model = spec.compile()
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return model
+def _model(level: Level, way: Way) -> mujoco.MjModel:
+    setting, change = way
+    spec = setting.spec(level)
+    if change is not None:
+        change(spec, level)
+    return spec.compile()

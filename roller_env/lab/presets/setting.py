@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -13,10 +14,15 @@ from roller_env.level import Level
 from roller_env.physics.presets import PRESETS, PhysicsPreset
 
 Option = float | int | str
-_ENUMS: Final[dict[str, tuple[type, str]]] = {
-    "solver": (mujoco.mjtSolver, "mjSOL_"),
-    "integrator": (mujoco.mjtIntegrator, "mjINT_"),
+ENUMS: Final[Mapping[str, Mapping[Option, int]]] = {
+    "solver": {"CG": mujoco.mjtSolver.mjSOL_CG, "PGS": mujoco.mjtSolver.mjSOL_PGS},
+    "integrator": {
+        "Euler": mujoco.mjtIntegrator.mjINT_EULER,
+        "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
+        "discrete": mujoco.mjtIntegrator.mjINT_DISCRETE,
+    },
 }
+"""The values of `Setting.options` that are written as names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,10 +56,7 @@ class Setting:
 
     def compile(self, level: Level) -> CompiledLevel:
         """Return the level compiled with this setting."""
-        compiled = compile_level(level, self.preset)
-        model = self.spec(level).compile()
-        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-        return replace(compiled, model=model)
+        return replace(compile_level(level, self.preset), model=self.spec(level).compile())
 
     def spec(self, level: Level) -> mujoco.MjSpec:
         """Return the level's MjSpec with this setting."""
@@ -61,19 +64,17 @@ class Setting:
         spec = build_spec(level, replace(self.preset, dt_s=contacts_at))
         option = spec.option
         option.timestep = self.preset.dt_s
+        option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         for name, value in self.options:
-            setattr(option, name, _value(name, value))
+            setattr(option, name, ENUMS.get(name, {}).get(value, value))
         for name, on in self.flags:
             set_flag(option, name, on)
         surfaces = [geom for geom in spec.geoms if geom.name != BALL]
         for geom in surfaces:
             self._change_contact(geom, contacts_at)
-        if self.pairs or self.friction_steps is not None:
-            for geom in surfaces:
-                pair = pair_with_ball(spec, geom)
-                if self.friction_steps is not None:
-                    pair.solreffriction = [0.0, -self.friction_steps / self.preset.dt_s]
-            spec.geom(BALL).contype = 0
+            if self.pairs or self.friction_steps is not None:
+                self._add_pair(spec, geom)
+                spec.geom(BALL).contype = 0
         return spec
 
     def _change_contact(self, geom: mujoco.MjsGeom, contacts_at: float) -> None:
@@ -84,17 +85,18 @@ class Setting:
         if self.impedance is not None:
             geom.solimp = [self.impedance, self.impedance, *geom.solimp[2:]]
 
-
-def pair_with_ball(spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> mujoco.MjsPair:
-    """Add an explicit contact pair of the ball and a geom, with the geom's contact."""
-    return spec.add_pair(
-        geomname1=geom.name,
-        geomname2=BALL,
-        condim=3,
-        friction=[geom.friction[0], geom.friction[0], 0.0, 0.0, 0.0],
-        solref=list(geom.solref),
-        solimp=list(geom.solimp),
-    )
+    def _add_pair(self, spec: mujoco.MjSpec, geom: mujoco.MjsGeom) -> None:
+        """Add an explicit contact pair of the ball and a geom, with the geom's contact."""
+        pair = spec.add_pair(
+            geomname1=geom.name,
+            geomname2=BALL,
+            condim=3,
+            friction=[geom.friction[0], geom.friction[0], 0.0, 0.0, 0.0],
+            solref=list(geom.solref),
+            solimp=list(geom.solimp),
+        )
+        if self.friction_steps is not None:
+            pair.solreffriction = [0.0, -self.friction_steps / self.preset.dt_s]
 
 
 def set_flag(option: mujoco.MjOption, name: str, on: bool) -> None:
@@ -105,10 +107,3 @@ def set_flag(option: mujoco.MjOption, name: str, on: bool) -> None:
         return
     disable = int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}"))
     option.disableflags = option.disableflags & ~disable | (0 if on else disable)
-
-
-def _value(name: str, value: Option) -> object:
-    if name not in _ENUMS:
-        return value
-    enum, prefix = _ENUMS[name]
-    return getattr(enum, f"{prefix}{str(value).upper()}")
