@@ -239,7 +239,8 @@ def draw_goals(goals: Frame, title: str) -> Figure:
         values = (row.measured, row.smallest, row.largest)
         most = row.sense == "at most"
         reached, *span = (row.goal / value if most else value / row.goal for value in values)
-        said = f"{row.measured:.3g}, {'≤' if most else '≥'} {row.goal:g}"
+        bound = f"{'≤' if most else '≥'} {row.goal:g}"
+        said = f"{row.measured:.3g}, {bound}" if row.rounds else f"not measured, {bound}"
         good = row.verdict == "met"
         rows.append(chart.Row(row.comparison, reached, tuple(span), good, said=said))
     note = "Green: the goal is reached. At the right what was measured, and the goal."

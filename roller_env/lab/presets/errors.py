@@ -407,42 +407,40 @@ class Requirement(NamedTuple):
         name: in `Errors`.
         title: for tables and charts.
         limit: largest bearable value.
+        reason: why that.
         unit: of the limit; empty for shares.
     """
 
     name: str
     title: str
     limit: float
+    reason: str
     unit: str = ""
 
 
-_NOT_SEEN: Final = 1e3 * RADIUS_M / 50, "mm"
-"""A fiftieth of the radius."""
+_ASKED: Final = "asked of the default preset"
+_AS_PATH: Final = "as for the path"
+_FALLS: Final = "deeper, it falls through"
+_NOT_SEEN: Final = (1e3 * RADIUS_M / 50, "a fiftieth of the radius is not seen", "mm")
 
 REQUIREMENTS: Final = (
-    # Asked of the default preset.
-    Requirement("path", "path after 5 s of driving", 0.01),
-    Requirement("heading_deg", "heading of the keys", 0.5, "°"),
-    # Deeper, it falls through.
-    Requirement("landing_share", "landing from 46.9 m", 1.0),
-    Requirement("fastest_share", "landing at 36 m/s", 1.0),
-    # Asked of the default preset.
-    Requirement("elasticity", "elasticity", 0.02),
-    Requirement("friction", "friction", 0.02),
-    # As for the path and the keys.
-    Requirement("skid_speed", "speed after a skid", 0.01),
-    Requirement("skid_heading_deg", "bend of a skid", 0.5, "°"),
+    Requirement("path", "path after 5 s of driving", 0.01, _ASKED),
+    Requirement("heading_deg", "heading of the keys", 0.5, _ASKED, "°"),
+    Requirement("landing_share", "landing from 46.9 m", 1.0, _FALLS),
+    Requirement("fastest_share", "landing at 36 m/s", 1.0, _FALLS),
+    Requirement("elasticity", "elasticity", 0.02, _ASKED),
+    Requirement("friction", "friction", 0.02, _ASKED),
+    Requirement("skid_speed", "speed after a skid", 0.01, _AS_PATH),
+    Requirement("skid_heading_deg", "bend of a skid", 0.5, "as for the keys", "°"),
     Requirement("rest_mm", "depth at rest", *_NOT_SEEN),
-    Requirement("lift", "height of the lift", 0.01),
+    Requirement("lift", "height of the lift", 0.01, _AS_PATH),
     Requirement("seam_mm", "bump of a seam", *_NOT_SEEN),
-    Requirement("movers", "speed of plate and gate", 0.01),
-    Requirement("ringing", "ringing of plate and gate", 0.01),
+    Requirement("movers", "speed of plate and gate", 0.01, _AS_PATH),
+    Requirement("ringing", "ringing of plate and gate", 0.01, _AS_PATH),
     Requirement("carried_mm", "depth on plate and gate", *_NOT_SEEN),
-    # Deeper, it falls through.
-    Requirement("squeeze_mm", "depth under a gate", 1e3 * THROUGH_M, "mm"),
-    # One speed in ten.
-    Requirement("lane_share", "thrown by a lane of seams", 0.1),
-    Requirement("course", "course of classic", 0.01),
+    Requirement("squeeze_mm", "depth under a gate", 1e3 * THROUGH_M, _FALLS, "mm"),
+    Requirement("lane_share", "thrown by a lane of seams", 0.1, "one speed in ten"),
+    Requirement("course", "course of classic", 0.01, _AS_PATH),
 )
 """The hop of a skid has no limit here, since what cures it costs the course; see the docs."""
 

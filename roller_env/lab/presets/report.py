@@ -85,6 +85,10 @@ def tables(settings: Frame, ablations: Frame) -> str:
     classic = modelled[modelled.boxes == 0][["what", "geoms", "us_per_step", "same"]]
     sizes = modelled[modelled.boxes > 0][["boxes", "what", "us_per_step", "same"]]
     same = ("µs a step", "same to the bit")
+    limits = [
+        [f"{one.title}, {one.unit}".removesuffix(", "), one.limit, one.reason]
+        for one in REQUIREMENTS
+    ]
     parts = [
         _settings_table(settings[settings.setting.isin(list(PRESETS))]),
         f"<details><summary>All {len(settings)} settings, the cheapest first</summary>\n",
@@ -92,6 +96,7 @@ def tables(settings: Frame, ablations: Frame) -> str:
         "</details>\n",
         markdown(("classic level", "geoms", *same), classic.to_numpy(object).tolist()),
         markdown(("boxes", "modelled", *same), sizes.to_numpy(object).tolist()),
+        markdown(("requirement", "at most", "why"), limits),
     ]
     return "\n".join(parts)
 
