@@ -13,23 +13,24 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args
 
 import mujoco
-import numpy as np
 import pandas as pd
 
 from roller_env.lab import chart, table
-from roller_env.lab.chart import COSTS, ROUNDING, duration
+from roller_env.lab.chart import duration
 from roller_env.lab.contact import CONTACT_SCENES
+from roller_env.lab.contact.scene import ContactScene
 from roller_env.lab.free import COMPLEX_BOX, FREE_SCENES, FreeScene, free_model
 from roller_env.lab.methods import MUJOCO, RIGID_BODY, Method, RigidBodyMethod
 from roller_env.lab.orders import EXACT, HORIZON_S, measured_orders
 from roller_env.lab.runner import REPEATS, header, interleaved, known, provenance, timed
-from roller_env.lab.scene import ERROR_KINDS, ErrorKind, Measure, Scene, measure
+from roller_env.lab.scene import CURVE, ERROR, ErrorKind, failures, measure, sound
 from roller_env.lab.table import Frame, markdown
 from roller_env.rigid_body import advance
 
+Scene = FreeScene | ContactScene
 SCENES: Final[tuple[Scene, ...]] = (*FREE_SCENES, *CONTACT_SCENES)
 """Everything there is to measure on, free motion first."""
 
@@ -100,38 +101,15 @@ ACCURATE: Final = 1e-2
 TIE: Final = 0.15
 """Costs within this of the cheapest count as the same: a shared machine's clock knows no better."""
 
-_ERROR: Final = ["scene", "measure"]
-_CURVE: Final = [*_ERROR, "method"]
 _COSTS: Final = {"CPU time": "cpu_s_per_s", "force evaluations": "evaluations_per_s"}
 _ANSWER: Final = ("dt_s", "error", "times_real_time", "evaluations_per_s")
-
-
-def sound(points: Frame, tolerance: float = math.inf) -> Frame:
-    """Return each curve's points before the first that fails or errs more as time steps grow.
-
-    Later ones are luck: a larger step that happens to land near the answer is no method that has
-    the error.
-    """
-    points = points.sort_values("dt_s", kind="stable")
-    bad = _failed(points) | (points.error > tolerance)
-    return points[bad.astype(int).groupby([points[key] for key in _CURVE]).cummax() == 0]
-
-
-def failures(points: Frame) -> Frame:
-    """Return each curve's point with the smallest step that failed, or gave no number."""
-    points = points.sort_values("dt_s", kind="stable")
-    return points[_failed(points)].drop_duplicates(_CURVE)
-
-
-def _failed(points: Frame) -> Any:
-    return points.failed | ~np.isfinite(points.error)
 
 
 def cheapest(points: Frame) -> Frame:
     """Return the cheapest method for each tolerance, by each cost; NaN where none was tried."""
     points = points.assign(times_real_time=1.0 / points.cpu_s_per_s)
-    largest, rows = points.groupby(_CURVE).dt_s.max(), []
-    for (scene, error), own in points.groupby(_ERROR, sort=False):
+    largest, rows = points.groupby(CURVE).dt_s.max(), []
+    for (scene, error), own in points.groupby(ERROR, sort=False):
         for tolerance in TOLERANCES:
             for cost, column in _COSTS.items():
                 best = sound(own, tolerance).sort_values([column, "error"])
@@ -151,23 +129,13 @@ def accurate_steps(points: Frame) -> Frame:
     """Return each method's largest accurate step, 0 for none, and the first that fails, or inf."""
     steps = Frame(
         {
-            "largest_dt_s": sound(points, ACCURATE).groupby(_CURVE).dt_s.max(),
-            "first_failing_dt_s": failures(points).groupby(_CURVE).dt_s.min(),
+            "largest_dt_s": sound(points, ACCURATE).groupby(CURVE).dt_s.max(),
+            "first_failing_dt_s": failures(points).groupby(CURVE).dt_s.min(),
         }
     )
-    curves = pd.MultiIndex.from_frame(points[_CURVE].drop_duplicates())
+    curves = pd.MultiIndex.from_frame(points[CURVE].drop_duplicates())
     steps = steps.reindex(curves).fillna({"largest_dt_s": 0.0, "first_failing_dt_s": math.inf})
     return steps.reset_index()
-
-
-def pareto(points: Frame, cost: str) -> Frame:
-    """Return the points of one error that no other beats in error and cost, cheapest first.
-
-    All errors under `ROUNDING` are alike: none is better than exact.
-    """
-    candidates = sound(points).sort_values([cost, "error"])
-    least = candidates.error.cummin().shift(fill_value=math.inf)
-    return candidates[candidates.error.clip(lower=ROUNDING) < least]
 
 
 # --- what a step costs -----------------------------------------------------------------------
@@ -248,41 +216,28 @@ class Results:
     orders: Frame
     costs: Frame
 
-    def charted(self, *kinds: ErrorKind) -> list[tuple[Scene, Measure]]:
-        """Return the error of a kind that stands for each scene: its first. Not all have one."""
-        firsts = [
-            (scene, next((one for one in scene.measures if one.kind == kind), None))
-            for kind in kinds
-            for scene in self.scenes
-        ]
-        return [(scene, first) for scene, first in firsts if first]
-
-    def of(self, errors: Iterable[tuple[Scene, Measure]]) -> Frame:
-        """Return the points of some scenes' errors."""
-        wanted = pd.MultiIndex.from_tuples([(scene.name, one.name) for scene, one in errors])
-        return self.points[pd.MultiIndex.from_frame(self.points[_ERROR]).isin(wanted)]
+    def charted(self, kind: ErrorKind) -> dict[str, chart.Plot]:
+        """Return the first error of a kind of every scene that has one, by the scene's name."""
+        plots = {}
+        for scene in self.scenes:
+            for error in [one for one in scene.measures if one.kind == kind][:1]:
+                own = self.points[self.points.scene == scene.name]
+                own = own[own.measure == error.name]
+                limits_s = scene.limits_s if isinstance(scene, FreeScene) else {}
+                plots[scene.name] = chart.Plot(scene.title, error.label, own, limits_s)
+        return plots
 
     @property
     def cheapest(self) -> Frame:
         """The cheapest method for each tolerance, of every error that is charted."""
-        return cheapest(self.of(self.charted(*ERROR_KINDS)))
+        plots = [plot for kind in get_args(ErrorKind) for plot in self.charted(kind).values()]
+        return cheapest(pd.concat([plot.points for plot in plots]))
 
     @property
     def accurate(self) -> Frame:
-        """The largest accurate step of each method on each scene."""
-        return accurate_steps(self.of([(scene, scene.measures[0]) for scene in self.scenes]))
-
-    def plot(self, scene: Scene, error: Measure) -> chart.Plot:
-        """Return what is drawn of one scene's error."""
-        own = self.of([(scene, error)])
-        fronts = {cost: pareto(own, cost) for cost in COSTS}
-        # In the order of the methods, smallest step first.
-        order = own.method.unique().tolist()
-        curves = sound(own).sort_values("method", key=lambda m: m.map(order.index), kind="stable")
-        limits_s = getattr(scene, "limits_s", {})
-        return chart.Plot(
-            scene.title, error.label, error.kind, curves, fronts, failures(own), limits_s
-        )
+        """The largest accurate step of each method for the first error of each scene."""
+        first = self.points.groupby("scene").measure.transform("first")
+        return accurate_steps(self.points[self.points.measure == first])
 
 
 def run(
@@ -301,27 +256,27 @@ def run(
 def write(results: Results, out: Path) -> list[Path]:
     """Write the tables and the charts of ``results`` into a directory, and return their paths."""
     facts = provenance()
+    tables = {
+        "points": results.points,
+        "orders": results.orders,
+        "cheapest": results.cheapest,
+        "accurate_steps": results.accurate,
+        "step_costs": results.costs,
+    }
+    figures = {"step-costs": draw_step_costs(results.costs)} if len(results.costs) else {}
+    free = [scene.name for scene in results.scenes if isinstance(scene, FreeScene)]
+    for kind in get_args(ErrorKind):
+        plots = results.charted(kind)
+        figures |= {f"{name}-{kind}": chart.draw_scene(plot) for name, plot in plots.items()}
+        for where in ("free", "contact"):
+            some = [plot for name, plot in plots.items() if (name in free) == (where == "free")]
+            if len(some) > 1:
+                figures[f"overview-{where}-{kind}"] = chart.draw_overview(some)
     files: list[Path] = []
-    for name, rows in (
-        ("points", results.points),
-        ("orders", results.orders),
-        ("cheapest", results.cheapest),
-        ("accurate_steps", results.accurate),
-        ("step_costs", results.costs),
-    ):
+    for name, rows in tables.items():
         files += table.write(rows, facts, out / name) if len(rows) else ()
-    if len(results.costs):
-        files += chart.save(draw_step_costs(results.costs), facts, out / "step-costs")
-    for kind in ERROR_KINDS:
-        overviews: dict[str, list[chart.Plot]] = {"free": [], "contact": []}
-        for scene, error in results.charted(kind):
-            plot = results.plot(scene, error)
-            overviews["free" if isinstance(scene, FreeScene) else "contact"].append(plot)
-            files += chart.save(chart.draw_scene(plot), facts, out / f"{scene.name}-{kind}")
-        for where, plots in overviews.items():
-            if len(plots) > 1:
-                figure = chart.draw_overview(plots)
-                files += chart.save(figure, facts, out / f"overview-{where}-{kind}")
+    for name, figure in figures.items():
+        files += chart.save(figure, facts, out / name)
     text = out / "accuracy.md"
     text.write_text(page(results, facts), encoding="utf-8")
     return [*files, text]
@@ -357,7 +312,7 @@ def orders_section(results: Results) -> str:
         return ""
     orders = results.orders.assign(shown=results.orders.measured.map(_order))
     wrong, odd = orders[~orders.agrees], orders[orders.reason != ""]
-    wide = orders.pivot_table("shown", "method", _ERROR, "first", sort=False).fillna("-")
+    wide = orders.pivot_table("shown", "method", ERROR, "first", sort=False).fillna("-")
     columns = {title: wide[key] for title, key in _SUITED.items() if key in wide}
     theory = orders.groupby("method", sort=False).theory.first()
     parts = [
@@ -369,13 +324,13 @@ def orders_section(results: Results) -> str:
         rows = [[m, f"{theory[m]:g}", *(of[m] for of in columns.values())] for m in wide.index]
         parts.append(markdown(["method", "theory", *columns], rows))
     if len(wrong):
-        rows = wrong[[*_CURVE, "theory", "shown"]].to_numpy(object).tolist()
+        rows = wrong[[*CURVE, "theory", "shown"]].to_numpy(object).tolist()
         titles = ["scene", "error", "method", "theory", "measured"]
         parts.append("Not as theory expects:\n\n" + markdown(titles, rows))
     parts.append("Where theory does not expect the method's own order, and why:\n")
     reasons = ""
     for reason, own in odd.groupby("reason"):
-        scenes, measures, methods = (", ".join(own[key].unique()) for key in _CURVE)
+        scenes, measures, methods = (", ".join(own[key].unique()) for key in CURVE)
         found = ", ".join(sorted(set(own.shown)))
         measures = measures.replace("_", " ")
         reasons += f"- **{measures}** on {scenes}: {found}. {reason}. ({methods})\n"
@@ -390,14 +345,15 @@ def cheapest_section(results: Results) -> str:
     """Return the table of the cheapest method for each tolerance."""
     answers = results.cheapest
     answers["said"] = [_answer(answer) for answer in answers.itertuples()]
-    said = answers.groupby([*_ERROR, "tolerance"]).said.agg(list)
+    said = answers.groupby([*ERROR, "tolerance"]).said.agg(list)
     rows = []
-    for scene, error in results.charted(*ERROR_KINDS):
-        name, label = scene.name, f"{error.label} ({error.kind})"
-        for tolerance in TOLERANCES:
-            both = said[scene.name, error.name, tolerance]
-            rows.append([name, label, f"{tolerance:.0e}", *both])
-            name = label = ""
+    for kind in get_args(ErrorKind):
+        for scene, plot in results.charted(kind).items():
+            names = [scene, f"{plot.label} ({kind})"]
+            for tolerance in TOLERANCES:
+                both = said[scene, plot.points.measure.iloc[0], tolerance]
+                rows.append([*names, f"{tolerance:.0e}", *both])
+                names = ["", ""]
     titles = ["scene", "error", "at most", "least CPU time", "fewest evaluations of the forces"]
     return markdown(titles, rows)
 

@@ -1,8 +1,7 @@
 """Every picture of the laboratory: one look, one way to save, and the shapes that recur.
 
 A colour means the same method everywhere. `grid` makes a page of panels, `against_limits` rows of
-what was measured beside what was allowed, `label` writes names where there is room for them, and
-`error_against_cost` is the chart of a method a curve, a time step a point.
+what was measured beside what was allowed, and `label` writes names where there is room for them.
 """
 
 from __future__ import annotations
@@ -22,9 +21,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
+from pandas import concat
 
 from roller_env.lab.runner import header
-from roller_env.lab.scene import ErrorKind
+from roller_env.lab.scene import ROUNDING, ErrorKind, failures, pareto, sound
 from roller_env.lab.table import Frame
 
 STYLE: Final[dict[Any, Any]] = {
@@ -211,9 +211,6 @@ COSTS: Final[Mapping[str, str]] = {
 }
 """The columns of `roller_env.lab.scene.measure` that are costs, with an axis' label."""
 
-ROUNDING: Final = 1e-13
-"""Errors below it are rounding of float64: the answer is exact."""
-
 _KINDS: Final[Mapping[ErrorKind, str]] = {
     "discretisation": "Discretisation error: against the same model with a vanishing time step.",
     "model": "Model error: against the rigid closed form, which a soft contact does not approach "
@@ -223,47 +220,44 @@ _SHOWN: Final = (1e-16, 1e12)
 """Errors beyond these are drawn at them."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Plot:
-    """One scene's error, with all that is drawn of it: points of `roller_env.lab.scene.measure`.
+    """One scene's error to be drawn.
 
     Attributes:
         title: of the scene.
         label: of the error's axis.
-        kind: of the error.
-        curves: each method's points before the first that fails, smallest time step first.
-        fronts: of each of `COSTS`, the points that no other beats.
-        failures: each method's smallest failing step.
+        points: of the error, rows of `roller_env.lab.scene.measure`.
         limits_s: method and the time step above which it is predicted to blow up.
     """
 
     title: str
     label: str
-    kind: ErrorKind
-    curves: Frame
-    fronts: Mapping[str, Frame]
-    failures: Frame
+    points: Frame
     limits_s: Mapping[str, float]
+
+    def curves(self) -> dict[str, Frame]:
+        """Return every method's sound points, smallest step first."""
+        curves = dict(iter(sound(self.points).groupby("method")))
+        return {name: curves[name] for name in self.points.method.unique() if name in curves}
 
 
 @styled
 def draw_scene(plot: Plot) -> Figure:
     """Draw one scene's error against both costs."""
-    note = f"{_KINDS[plot.kind]} Lower left is better; labels are time steps. {_alike(plot)}"
+    note = f"{_note([plot])} Labels are time steps. {_alike(plot)}"
     figure, panels = grid(
         (1, 2), plot.title, note, panel=(5.2, 5.0), margins=(0.9, 2.6, 1.7, 0.8), sharey=True
     )
-    by_method = plot.curves.groupby("method", sort=False)
-    ends = [*by_method.head(1).itertuples(), *by_method.tail(1).itertuples()]
     for axes, (cost, title) in zip(panels[0], COSTS.items(), strict=True):
         _draw_panel(axes, plot, cost)
         _draw_guides(axes)
         axes.set_xlabel(title)
-        named = [
-            (duration(p.dt_s), getattr(p, cost), float(_clip(p.error)), colour(p.method))
-            for p in (*plot.fronts[cost].itertuples(), *ends)
-        ]
-        label(axes, dict.fromkeys(named))
+        ends = [curve.iloc[[0, -1]] for curve in plot.curves().values()]
+        named = concat([pareto(plot.points, cost), *ends])
+        clipped, colours = named.error.clip(*_SHOWN), named.method.map(colour)
+        names = zip(named.dt_s.map(duration), named[cost], clipped, colours, strict=True)
+        label(axes, dict.fromkeys(names))
     panels[0, 0].set_ylabel(plot.label)
     figure.legend(handles=_legend([plot]), loc="center right", fontsize=8)
     return figure
@@ -273,9 +267,8 @@ def draw_scene(plot: Plot) -> Figure:
 def draw_overview(plots: Sequence[Plot], columns: int = 3) -> Figure:
     """Draw the errors of several scenes against CPU time, a panel each."""
     columns = min(columns, len(plots))
-    shape = (math.ceil(len(plots) / columns), columns)
-    note = f"{_KINDS[plots[0].kind]} Lower left is better."
-    figure, panels = grid(shape, "Error against cost", note, margins=(0.9, 2.7, 1.2, 0.8))
+    shape, margins = (math.ceil(len(plots) / columns), columns), (0.9, 2.7, 1.2, 0.8)
+    figure, panels = grid(shape, "Error against cost", _note(plots), margins=margins)
     for axes in panels.ravel()[len(plots) :]:
         axes.set_axis_off()
     for axes, plot in zip(panels.ravel(), plots, strict=False):
@@ -289,13 +282,17 @@ def draw_overview(plots: Sequence[Plot], columns: int = 3) -> Figure:
     return figure
 
 
+def _note(plots: Sequence[Plot]) -> str:
+    return f"{_KINDS[plots[0].points.kind.iloc[0]]} Lower left is better."
+
+
 def _draw_panel(axes: Axes, plot: Plot, cost: str) -> None:
     """Draw the front and every method's curve; above them its cross and its predicted limit."""
-    front = plot.fronts[cost]
-    axes.plot(front[cost], _clip(front.error), c=PARETO, lw=9, solid_capstyle="round", zorder=1.5)
-    curves = dict(iter(plot.curves.groupby("method", sort=False)))
+    front, curves, failed = pareto(plot.points, cost), plot.curves(), failures(plot.points)
+    wide: dict[str, Any] = {"lw": 9, "solid_capstyle": "round", "zorder": 1.5}
+    axes.plot(front[cost], front.error.clip(*_SHOWN), color=PARETO, **wide)
     for method, curve in curves.items():
-        axes.plot(curve[cost], _clip(curve.error), **_line(method))
+        axes.plot(curve[cost], curve.error.clip(*_SHOWN), **_line(method))
     axes.set(xscale="log", yscale="log")
     axes.margins(x=0.08)
     bottom, top = axes.get_ylim()
@@ -306,24 +303,17 @@ def _draw_panel(axes: Axes, plot: Plot, cost: str) -> None:
         said: dict[str, Any] = {"fontsize": 7, "color": "#8a8a8a", "va": "bottom"}
         inside = axes.get_yaxis_transform()
         axes.text(0.01, bottom, "rounding: exact", transform=inside, **said)
-    axes.set_ylim(bottom, top * (top / bottom) ** (0.16 if len(plot.failures) else 0.0))
+    axes.set_ylim(bottom, top * (top / bottom) ** (0.16 if len(failed) else 0.0))
     over: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "mew": 2}
-    taken: dict[int, int] = {}
-    for point in plot.failures.itertuples():
-        at = getattr(point, cost)
-        # Crosses of about one cost are put one below the other.
-        place = round(4.0 * math.log10(at))
-        taken[place] = taken.get(place, -1) + 1
-        height = 0.965 - 0.033 * taken[place]
-        axes.plot(at, height, "x", ms=8, color=colour(point.method), **over)
-    for method in plot.limits_s.keys() & curves.keys():
+    # Crosses of about one cost are put one below the other.
+    place = (4.0 * np.log10(failed[cost])).round()
+    heights = 0.965 - 0.033 * failed.groupby(place).cumcount()
+    for method, x, height in zip(failed.method, failed[cost], heights, strict=True):
+        axes.plot(x, height, "x", ms=8, color=colour(method), **over)
+    for method in [method for method in curves if method in plot.limits_s]:
         first = curves[method].iloc[0]
-        at = first[cost] * first.dt_s / plot.limits_s[method]
-        axes.plot(at, 1.0, "|", ms=13, color=colour(method), clip_on=False, **over)
-
-
-def _clip(error: Any) -> Any:
-    return np.clip(error, *_SHOWN)
+        x = first[cost] * first.dt_s / plot.limits_s[method]
+        axes.plot(x, 1.0, "|", ms=13, color=colour(method), clip_on=False, **over)
 
 
 def _line(method: str) -> dict[str, Any]:
@@ -362,19 +352,15 @@ def duration(seconds: float) -> str:
 
 def _alike(plot: Plot) -> str:
     """Return a sentence on the methods whose curves cover one another, or nothing."""
-    by_method = plot.curves.groupby("method", sort=False)
-    curves = {method: curve.set_index("dt_s").error for method, curve in by_method}
+    curves = {method: curve.set_index("dt_s").error for method, curve in plot.curves().items()}
     # The rounding of 10^5 steps adds up to more than that of one.
-    sure = curves.keys() - set(plot.failures.method)
-    exact = [m for m, errors in curves.items() if m in sure and errors.max() < 100.0 * ROUNDING]
-    groups: list[list[str]] = []
+    exact = [method for method, errors in curves.items() if errors.max() < 100.0 * ROUNDING]
+    exact = [method for method in exact if method not in set(failures(plot.points).method)]
+    groups: dict[str, list[str]] = {}
     for method in [method for method in curves if method not in exact]:
-        like = [group for group in groups if _same(curves[group[0]], curves[method])]
-        if like:
-            like[0].append(method)
-        else:
-            groups.append([method])
-    sentences = [f"One curve: {', '.join(group)}." for group in groups if len(group) > 1]
+        like = [first for first in groups if _same(curves[first], curves[method])]
+        groups.setdefault((like or [method])[0], []).append(method)
+    sentences = [f"One curve: {', '.join(group)}." for group in groups.values() if len(group) > 1]
     if exact:
         sentences.append(f"Exact at every time step: {', '.join(exact)}.")
     return " ".join(sentences)
@@ -388,7 +374,7 @@ def _same(one: Any, other: Any) -> bool:
 
 def _legend(plots: Sequence[Plot]) -> list[Line2D]:
     """Return the legend's entries: the methods by family, the front, the cross and the limit."""
-    methods = dict.fromkeys(method for plot in plots for method in plot.curves.method)
+    methods = dict.fromkeys(method for plot in plots for method in plot.curves())
     entries: list[Line2D] = []
     for family, title in (("MuJoCo ", "MuJoCo, in C"), ("ours ", "ours, compiled by Numba")):
         own = [method for method in methods if method.startswith(family)]
@@ -396,7 +382,7 @@ def _legend(plots: Sequence[Plot]) -> list[Line2D]:
         entries += [Line2D([], [], label=m.removeprefix(family), **_line(m)) for m in own]
     entries.append(Line2D([], [], color=PARETO, lw=9, label="Pareto front: none is better"))
     dark: dict[str, Any] = {"color": PREDICTION, "ls": "", "mew": 2}
-    if any(len(plot.failures) for plot in plots):
+    if any(len(failures(plot.points)) for plot in plots):
         entries.append(Line2D([], [], marker="x", ms=8, label="first to fail", **dark))
     if any(plot.limits_s for plot in plots):
         entries.append(Line2D([], [], marker="|", ms=13, label="predicted to blow up", **dark))

@@ -89,25 +89,6 @@ class Acting:
         return np.empty(0) if self.held is None else self.held.switches_s
 
 
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """Something whose error is measured."""
-
-    name: str
-    label: str
-    """What a chart's axis says; ``{horizon}`` stands for the seconds simulated."""
-    of: Callable[[FreeScene, State], Float64]
-    """Its value in the rows of a state, (K,) or (K, n); for `ATTITUDE` the quaternion."""
-
-    def error(self, scene: FreeScene, measured: State) -> float:
-        """Return the largest error over the rows, relative unless it is an angle."""
-        value, truth = self.of(scene, measured), self.of(scene, scene.truth)
-        if self is ATTITUDE:
-            return float(quaternion.angle_between(value, truth).max())
-        scale = max(_sizes(truth).max(), _sizes(self.of(scene, scene.start)).max())
-        return float(_sizes(value - truth).max() / scale)
-
-
 def _sizes(values: Float64) -> Float64:
     """Return the lengths of vectors, or the magnitudes of numbers, (K,)."""
     return np.abs(values) if values.ndim == 1 else quaternion.norm(values)
@@ -137,26 +118,23 @@ def _growth(scene: FreeScene, state: State) -> Float64:
     return rate
 
 
-POSITION, VELOCITY, ATTITUDE, ANGULAR_VELOCITY, ANGULAR_MOMENTUM, ENERGY, GROWTH = (
-    Quantity(name, label, of)
-    for name, label, of in (
-        ("position", "position error over {horizon} / distance from the start", _travelled),
-        ("velocity", "velocity error over {horizon} / largest velocity", lambda _, s: s.velocity),
-        ("attitude", "attitude error over {horizon}, rad", lambda _, s: s.rotation),
-        (
-            "angular_velocity",
-            "angular velocity error over {horizon} / largest",
-            lambda _, s: s.angular_velocity,
-        ),
-        (
-            "angular_momentum",
-            "angular momentum error over {horizon} / largest",
-            lambda _, s: s.angular_momentum,
-        ),
-        ("energy", "energy error over {horizon} / largest energy", _energy),
-        ("growth", "error of the wobble's growth rate, relative", _growth),
-    )
-)
+QUANTITIES: Final[Mapping[str, tuple[str, Callable[[FreeScene, State], Float64]]]] = {
+    "position": ("position error over {} / distance from the start", _travelled),
+    "velocity": ("velocity error over {} / largest velocity", lambda _, s: s.velocity),
+    "attitude": ("attitude error over {}, rad", lambda _, s: s.rotation),
+    "angular_velocity": (
+        "angular velocity error over {} / largest",
+        lambda _, s: s.angular_velocity,
+    ),
+    "angular_momentum": (
+        "angular momentum error over {} / largest",
+        lambda _, s: s.angular_momentum,
+    ),
+    "energy": ("energy error over {} / largest energy", _energy),
+    "growth": ("error of the wobble's growth rate, relative", _growth),
+}
+"""What a chart's axis says of each error, with the seconds simulated, and its value in the rows of
+a state, (K,) or (K, n)."""
 
 
 @dataclass(frozen=True)
@@ -167,8 +145,8 @@ class FreeScene:
     title: str
     start: State
     """One body at time 0."""
-    quantities: tuple[Quantity, ...]
-    """What is measured; the first is what the chart shows."""
+    quantities: tuple[str, ...]
+    """What is measured of `QUANTITIES`; the first is what the chart shows."""
     time_steps_s: Sequence[float]
     """Largest first. Each divides the time between two moments."""
     acting: Acting = Acting()
@@ -185,10 +163,8 @@ class FreeScene:
     def measures(self) -> Sequence[Measure]:
         """See `Scene.measures`."""
         horizon = f"{self.horizon_s:g} s"
-        return [
-            Measure(one.name, one.label.format(horizon=horizon), "discretisation")
-            for one in self.quantities
-        ]
+        labels = {name: QUANTITIES[name][0].format(horizon) for name in self.quantities}
+        return [Measure(name, label, "discretisation") for name, label in labels.items()]
 
     @property
     def moment_s(self) -> float:
@@ -237,6 +213,15 @@ class FreeScene:
         fitting = [dt for dt in self.time_steps_s if dt <= moment_s * (1.0 + 1e-9)]
         return replace(self, horizon_s=horizon_s, time_steps_s=fitting)
 
+    def error(self, name: str, measured: State) -> float:
+        """Return the largest error of a quantity over the moments, relative unless an angle."""
+        of = QUANTITIES[name][1]
+        value, truth = of(self, measured), of(self, self.truth)
+        if name == "attitude":
+            return float(quaternion.angle_between(value, truth).max())
+        scale = max(_sizes(truth).max(), _sizes(of(self, self.start)).max())
+        return float(_sizes(value - truth).max() / scale)
+
 
 def _turned(acting: Acting, start: State, times_s: Float64) -> State:
     """Return the rotation at rising times: a closed form where there is one."""
@@ -277,31 +262,35 @@ class FreeTrial(ABC):
     """One run of a free scene; a `roller_env.lab.scene.SteadyTrial`.
 
     Attributes:
-        part_s: simulated time of the part that is timed, seconds.
-        reached: where the last run was at the scene's moments, a row for each.
+        part_s: simulated time of the part that is timed, seconds: of some milliseconds of work,
+            against which starting the clock is nothing.
     """
 
-    reached: State
-
     def __init__(self, scene: FreeScene, dt_s: float, part_steps: int) -> None:
-        # The part takes some milliseconds, against which starting the clock is nothing.
         self._scene, self._dt_s, self._part_steps = scene, dt_s, part_steps
         self._steps, self.part_s = scene.steps_to_a_moment(dt_s), part_steps * dt_s
 
     @abstractmethod
+    def _simulate(self, steps: int, moments: int) -> None:
+        """Go from the start to so many moments, so many steps apart."""
+
+    @property
+    @abstractmethod
+    def reached(self) -> State:
+        """Where the last run was at its moments, a row for each."""
+
     def run(self) -> None:
         """See `SteadyTrial.run`."""
+        self._simulate(self._steps, self._scene.moments)
 
-    @abstractmethod
     def run_part(self) -> None:
         """See `SteadyTrial.run_part`."""
+        self._simulate(self._part_steps, 1)
 
     def errors(self) -> dict[str, float]:
         """See `SteadyTrial.errors`."""
         with np.errstate(all="ignore"):  # a motion that blew up is a result
-            return {
-                one.name: one.error(self._scene, self.reached) for one in self._scene.quantities
-            }
+            return {name: self._scene.error(name, self.reached) for name in self._scene.quantities}
 
 
 class _RigidBodyTrial(FreeTrial):
@@ -311,20 +300,20 @@ class _RigidBodyTrial(FreeTrial):
         super().__init__(scene, dt_s, 5000)
         self._integrator, self._load = method.integrator, scene.acting.load()
 
-    def run(self) -> None:
-        path = [self._scene.start]
-        for moment in range(self._scene.moments):
-            begin_s = moment * self._steps * self._dt_s
-            path.append(self._advanced(path[-1], self._steps, begin_s))
-        self.reached = in_rows(path[1:])
-
-    def run_part(self) -> None:
-        self._advanced(self._scene.start, self._part_steps, 0.0)
-
-    def _advanced(self, state: State, steps: int, start_s: float) -> State:
-        held, how = self._scene.acting.held, (self._integrator, self._dt_s, steps)
+    def _simulate(self, steps: int, moments: int) -> None:
+        path, how = [self._scene.start], (self._integrator, self._dt_s, steps)
+        held = self._scene.acting.held
         with np.errstate(all="ignore"):
-            return rigid_body.advance(state, *how, load=self._load, held=held, start_s=start_s)
+            for moment in range(moments):
+                now = moment * steps * self._dt_s
+                path.append(
+                    rigid_body.advance(path[-1], *how, load=self._load, held=held, start_s=now)
+                )
+        self._path = path[1:]
+
+    @property
+    def reached(self) -> State:
+        return in_rows(self._path)
 
 
 class _MujocoTrial(FreeTrial):
@@ -335,33 +324,25 @@ class _MujocoTrial(FreeTrial):
         self._model = free_model(scene.start.body, method, dt_s)
         self._data = mujoco.MjData(self._model)
 
-    def _begin(self) -> None:
-        data, acting = self._data, self._scene.acting
-        mujoco.mj_resetData(self._model, data)
-        acting.apply(self._model, data)
-        acting.hold(data, 0.0)
+    def _simulate(self, steps: int, moments: int) -> None:
+        model, data, acting = self._model, self._data, self._scene.acting
+        mujoco.mj_resetData(model, data)
+        acting.apply(model, data)
         (data.qpos[:],), (data.qvel[:],) = to_mujoco(self._scene.start)
 
-    def run(self) -> None:
-        self._begin()
-        acting, data = self._scene.acting, self._data
-        # A force that is held has to be looked up in every step, which only keys are worth.
-        every = self._steps if acting.held is None else 1
-        with without_warnings():
-            path = simulate.record(
-                self._model,
-                data,
-                self._steps * self._scene.moments,
-                every=every,
-                before=lambda step: acting.hold(data, step * self._dt_s),
-            )
-        at = slice(self._steps // every, None, self._steps // every)
-        self.reached = from_mujoco(self._scene.start, path.qpos[at], path.qvel[at])
+        def hold(step: int) -> None:
+            acting.hold(data, step * self._dt_s)
 
-    def run_part(self) -> None:
-        self._begin()
+        # A force that is held has to be looked up in every step, which only keys are worth.
+        every = steps if acting.held is None else 1
         with without_warnings():
-            mujoco.mj_step(self._model, self._data, self._part_steps)
+            path = simulate.record(model, data, steps * moments, every=every, before=hold)
+        at = slice(steps // every, None, steps // every)
+        self._qpos, self._qvel = path.qpos[at], path.qvel[at]
+
+    @property
+    def reached(self) -> State:
+        return from_mujoco(self._scene.start, self._qpos, self._qvel)
 
 
 def in_rows(states: Sequence[State]) -> State:
@@ -437,7 +418,7 @@ SIMPLE_BOX: Final = FreeScene(
     name="simple-box",
     title="Weightless box turning about a principal axis",
     start=State.create(BENCHMARK_BOX, velocity=(-0.9, 0.4, 0.1), angular_velocity=(0.5, 0.0, 0.0)),
-    quantities=(ATTITUDE, POSITION, VELOCITY, ENERGY, ANGULAR_MOMENTUM),
+    quantities=("attitude", "position", "velocity", "energy", "angular_momentum"),
     time_steps_s=one_two_five(1.0, 1e-4),
 )
 COMPLEX_BOX: Final = FreeScene(
@@ -445,35 +426,35 @@ COMPLEX_BOX: Final = FreeScene(
     title="Thrown box that tumbles about its middle axis",
     start=State.create(BENCHMARK_BOX, velocity=(-2.0, 2.0, 8.0), angular_velocity=(0.1, 5.0, 0.1)),
     acting=Acting(gravity_m_s2=GRAVITY_M_S2),
-    quantities=(ATTITUDE, POSITION, VELOCITY, ENERGY, ANGULAR_MOMENTUM),
+    quantities=("attitude", "position", "velocity", "energy", "angular_momentum"),
     time_steps_s=one_two_five(0.2, 1e-4),
 )
 ASYMMETRIC_TOP: Final = FreeScene(
     name="asymmetric-top",
     title="Free body of three different moments of inertia",
     start=State.create(TOP, angular_velocity=(1.5, 0.7, 2.0)),
-    quantities=(ATTITUDE, ANGULAR_VELOCITY, ENERGY, ANGULAR_MOMENTUM),
+    quantities=("attitude", "angular_velocity", "energy", "angular_momentum"),
     time_steps_s=one_two_five(0.5, 1e-4),
 )
 MIDDLE_AXIS: Final = FreeScene(
     name="middle-axis",
     title="Spin about the middle axis, which turns over",
     start=State.create(TOP, angular_velocity=(2.0 * WOBBLE, 2.0, 0.0)),
-    quantities=(ATTITUDE, GROWTH, ENERGY, ANGULAR_MOMENTUM),
+    quantities=("attitude", "growth", "energy", "angular_momentum"),
     time_steps_s=one_two_five(0.5, 1e-4),
 )
 SYMMETRIC_TOP: Final = FreeScene(
     name="symmetric-top",
     title="Free symmetric top, wobbling",
     start=State.create(Body.from_inertia((1.0, 1.0, 1.7)), angular_velocity=(1.0, 0.5, 2.0)),
-    quantities=(ATTITUDE, ANGULAR_VELOCITY, ENERGY, ANGULAR_MOMENTUM),
+    quantities=("attitude", "angular_velocity", "energy", "angular_momentum"),
     time_steps_s=one_two_five(0.5, 1e-4),
 )
 CONSTANT_SPIN: Final = FreeScene(
     name="constant-spin",
     title="Cube spinning freely at 3 rad/s",
     start=State.create(CUBE, angular_velocity=(1.0, 2.0, 2.0)),
-    quantities=(ATTITUDE, ENERGY, ANGULAR_MOMENTUM),
+    quantities=("attitude", "energy", "angular_momentum"),
     time_steps_s=one_two_five(1.0, 1e-4),
 )
 DAMPED_SPIN: Final = FreeScene(
@@ -481,7 +462,7 @@ DAMPED_SPIN: Final = FreeScene(
     title="The report's cube: torque (1, 0, 0) - 0.1 ω",
     start=State.create(CUBE),
     acting=Acting(torque_nm=(1.0, 0.0, 0.0), spin_damping_nm_s=0.1),
-    quantities=(ATTITUDE, ANGULAR_MOMENTUM, ENERGY),
+    quantities=("attitude", "angular_momentum", "energy"),
     time_steps_s=one_two_five(1.0, 1e-4),
 )
 _REAL_LIMITS: Final = {1: 2.0, 2: 2.0, 3: 2.5127453266183286, 4: 2.785293563405282}
@@ -500,7 +481,7 @@ DRAG: Final = FreeScene(
         if method.name == "MuJoCo RK4"
         or (isinstance(method, RigidBodyMethod) and method.name != "ours splitting4")
     },
-    quantities=(POSITION, VELOCITY, ENERGY),
+    quantities=("position", "velocity", "energy"),
     time_steps_s=one_two_five(1.0, 1e-4),
 )
 PROJECTILE: Final = FreeScene(
@@ -508,7 +489,7 @@ PROJECTILE: Final = FreeScene(
     title="Thrown cube, in 2 s",
     start=State.create(CUBE, velocity=(3.0, 0.0, 8.0)),
     acting=Acting(gravity_m_s2=GRAVITY_M_S2),
-    quantities=(POSITION, VELOCITY, ENERGY),
+    quantities=("position", "velocity", "energy"),
     time_steps_s=one_two_five(0.2, 1e-4),
     horizon_s=2.0,
 )

@@ -1,7 +1,8 @@
-"""The interface between a scene, which knows an answer, and what measures methods on it."""
+"""What a scene, which knows an answer, promises, and the points that methods make on it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal, Protocol, runtime_checkable
@@ -10,9 +11,9 @@ import numpy as np
 
 from roller_env.lab.methods import Method, without_warnings
 from roller_env.lab.runner import cpu_seconds, spread
+from roller_env.lab.table import Frame
 
 ErrorKind = Literal["discretisation", "model"]
-ERROR_KINDS: Final[tuple[ErrorKind, ...]] = ("discretisation", "model")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,38 +50,19 @@ class SteadyTrial(Protocol):
         """Simulate the part. This is what is timed, and `run` is not."""
 
     def errors(self) -> Mapping[str, float]:
-        """Return the errors of the last run by the name of their `Measure`.
-
-        Not finite, or absurdly large, where the method failed.
-        """
+        """Return the last run's errors by their `Measure`; not finite, or huge, where it failed."""
 
 
 class Scene(Protocol):
-    """A motion with a known answer."""
+    """A motion with a known answer; it also has a ``title`` and a ``horizon_s``, seconds."""
 
     @property
     def name(self) -> str:
         """Its key on the command line and in files."""
 
     @property
-    def title(self) -> str:
-        """What a chart's panel is called, for somebody who has never heard of it."""
-
-    @property
-    def horizon_s(self) -> float:
-        """Simulated time, seconds."""
-
-    @property
     def measures(self) -> Sequence[Measure]:
-        """Its errors; the first is the one that the chart shows."""
-
-    @property
-    def methods(self) -> Sequence[Method]:
-        """The methods that can simulate it."""
-
-    @property
-    def time_steps_s(self) -> Sequence[float]:
-        """Time steps of a full run, largest first: {1, 2, 5} x 10^k."""
+        """Its errors; a chart shows the first of each kind."""
 
     @property
     def failure(self) -> float:
@@ -101,8 +83,8 @@ def measure(scene: Scene, method: Method, dt_s: float, repeats: int) -> list[dic
     trial = scene.trial(method, dt_s)
     with without_warnings():
         trial.run()
+        errors = trial.errors()
         seconds = cpu_seconds(trial.run_part, repeats)
-    errors = trial.errors()
     failed = not errors[scene.measures[0].name] < scene.failure
     return [
         {
@@ -119,3 +101,43 @@ def measure(scene: Scene, method: Method, dt_s: float, repeats: int) -> list[dic
         }
         for one in scene.measures
     ]
+
+
+# --- points ----------------------------------------------------------------------------------
+
+ERROR: Final = ["scene", "measure"]
+CURVE: Final = [*ERROR, "method"]
+
+ROUNDING: Final = 1e-13
+"""Errors below it are rounding of float64: the answer is exact."""
+
+
+def sound(points: Frame, tolerance: float = math.inf) -> Frame:
+    """Return each curve's points before the first that fails or errs more as time steps grow.
+
+    Later ones are luck: a larger step that happens to land near the answer is no method that has
+    the error.
+    """
+    points = points.sort_values("dt_s", kind="stable")
+    bad = _failed(points) | (points.error > tolerance)
+    return points[bad.astype(int).groupby([points[key] for key in CURVE]).cummax() == 0]
+
+
+def failures(points: Frame) -> Frame:
+    """Return each curve's point with the smallest step that failed, or gave no number."""
+    points = points.sort_values("dt_s", kind="stable")
+    return points[_failed(points)].drop_duplicates(CURVE)
+
+
+def _failed(points: Frame) -> Any:
+    return points.failed | ~np.isfinite(points.error)
+
+
+def pareto(points: Frame, cost: str) -> Frame:
+    """Return the points of one error that no other beats in error and cost, cheapest first.
+
+    All errors under `ROUNDING` are alike: none is better than exact.
+    """
+    candidates = sound(points).sort_values([cost, "error"])
+    least = candidates.error.cummin().shift(fill_value=math.inf)
+    return candidates[candidates.error.clip(lower=ROUNDING) < least]
