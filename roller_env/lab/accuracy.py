@@ -10,25 +10,23 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final, get_args
 
-import mujoco
 import pandas as pd
 
 from roller_env.lab import chart, table
 from roller_env.lab.chart import duration
 from roller_env.lab.contact import CONTACT_SCENES
 from roller_env.lab.contact.scene import ContactScene
-from roller_env.lab.free import COMPLEX_BOX, FREE_SCENES, FreeScene, free_model
-from roller_env.lab.methods import MUJOCO, RIGID_BODY, Method, RigidBodyMethod
+from roller_env.lab.free import COMPLEX_BOX, FREE_SCENES, FreeScene
+from roller_env.lab.methods import FREE, Method, RigidBodyMethod
 from roller_env.lab.orders import EXACT, HORIZON_S, measured_orders
 from roller_env.lab.runner import REPEATS, header, interleaved, known, provenance, timed
 from roller_env.lab.scene import CURVE, ERROR, ErrorKind, failures, measure, sound
 from roller_env.lab.table import Frame, markdown
-from roller_env.rigid_body import advance
 
 Scene = FreeScene | ContactScene
 SCENES: Final[tuple[Scene, ...]] = (*FREE_SCENES, *CONTACT_SCENES)
@@ -142,6 +140,7 @@ def accurate_steps(points: Frame) -> Frame:
 
 BATCHES: Final = (1, 1000)
 """Bodies that advance in one call of ours."""
+_COST_STEP_S: Final = 1e-3
 
 
 def step_costs(repeats: int) -> Frame:
@@ -151,50 +150,39 @@ def step_costs(repeats: int) -> Frame:
         ``method``, ``bodies`` that advance in one call, ``us_per_body_step`` (median) and
         ``us_per_body_evaluation``.
     """
-    start, acting, dt_s = COMPLEX_BOX.start, COMPLEX_BOX.acting, 1e-3
-    cases: dict[str, tuple[Method, int, int, Callable[[], object]]] = {}
-    for method in MUJOCO:
-        model = free_model(start.body, method, dt_s)
-        data = mujoco.MjData(model)
-        acting.apply(model, data)
-        cases[method.name] = method, 1, 2000, partial(mujoco.mj_step, model, data, 2000)
-    for ours in RIGID_BODY:
-        for bodies in BATCHES:
-            steps, batch = 20_000 // bodies, start.take([0] * bodies)
-            work = partial(advance, batch, ours.integrator, dt_s, steps, load=acting.load())
-            cases[f"{ours.name} {bodies}"] = ours, bodies, steps, work
-    turns = {name: partial(timed, case[-1], time.thread_time) for name, case in cases.items()}
+    trials = {}
+    for method in FREE:
+        for bodies in BATCHES if isinstance(method, RigidBodyMethod) else (1,):
+            thrown = replace(COMPLEX_BOX, start=COMPLEX_BOX.start.take([0] * bodies))
+            trials[method, bodies] = thrown.trial(method, _COST_STEP_S)
+    turns = {
+        f"{method.name} {bodies}": partial(timed, trial.run_part, time.thread_time)
+        for (method, bodies), trial in trials.items()
+    }
     for warm_up in turns.values():
         warm_up()
     median_s = Frame(interleaved(turns, repeats)).median()
     rows = []
-    for name, (case, bodies, steps, _) in cases.items():
-        us = 1e6 * median_s[name] / (steps * bodies)
-        row = {"method": case.name, "bodies": bodies, "us_per_body_step": us}
-        rows.append(row | {"us_per_body_evaluation": us / case.evaluations})
+    for (method, bodies), trial in trials.items():
+        us = 1e6 * median_s[f"{method.name} {bodies}"] * _COST_STEP_S / trial.part_s / bodies
+        row = {"method": method.name, "bodies": bodies, "us_per_body_step": us}
+        rows.append(row | {"us_per_body_evaluation": us / method.evaluations})
     return Frame(rows)
 
 
 def draw_step_costs(costs: Frame) -> Any:
     """Draw what a step costs a body, against MuJoCo's Runge-Kutta."""
     theirs = float(costs[costs.method == "MuJoCo RK4"].us_per_body_step.iloc[0])
-    rows = [
-        chart.Row(
-            f"{one.method}, {one.bodies:,} at a time",
-            one.us_per_body_step,
-            good=one.us_per_body_step <= theirs,
-            said=f"{theirs / one.us_per_body_step:.2g}x",
-        )
-        for one in costs.itertuples()
-    ]
     note = (
         "On the thrown box, one thread. The line is MuJoCo's RK4; at the right how many steps of "
         "each are done while it does one."
     )
-    title, xlabel = "What a step of a free body costs", "CPU µs a step of a body"
-    return chart.against_limits(
-        rows, title, note, xlabel, (0.05, 100.0), limit=theirs, label_in=3.2
-    )
+    rows = []
+    for one in costs.itertuples():
+        us, label = one.us_per_body_step, f"{one.method}, {one.bodies:,} at a time"
+        rows.append(chart.Row(label, us, good=us <= theirs, said=f"{theirs / us:.2g}x"))
+    said = ("What a step of a free body costs", note, "CPU µs a step of a body")
+    return chart.against_limits(rows, *said, (0.05, 100.0), limit=theirs, label_in=3.2)
 
 
 # --- results ---------------------------------------------------------------------------------

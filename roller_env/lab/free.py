@@ -297,7 +297,7 @@ class _RigidBodyTrial(FreeTrial):
     """One run of one of our integrators."""
 
     def __init__(self, scene: FreeScene, method: RigidBodyMethod, dt_s: float) -> None:
-        super().__init__(scene, dt_s, 5000)
+        super().__init__(scene, dt_s, max(1, 5000 // scene.start.count))
         self._integrator, self._load = method.integrator, scene.acting.load()
 
     def _simulate(self, steps: int, moments: int) -> None:
@@ -320,7 +320,7 @@ class _MujocoTrial(FreeTrial):
     """One run of MuJoCo's free joint, stepped in C."""
 
     def __init__(self, scene: FreeScene, method: MujocoMethod, dt_s: float) -> None:
-        super().__init__(scene, dt_s, 1000)
+        super().__init__(scene, dt_s, 2000)
         self._model = free_model(scene.start.body, method, dt_s)
         self._data = mujoco.MjData(self._model)
 

@@ -172,7 +172,7 @@ class Settings:
     def __post_init__(self) -> None:
         positive_time("dt", self.dt_s)
         positive_time("duration", self.duration_s)
-        for what, time_s in self._boundaries():
+        for time_s, what in self._ends().items():
             steps = time_s / self.dt_s
             if not _whole(steps):
                 raise ValueError(
@@ -180,25 +180,22 @@ class Settings:
                     f"to be a whole number of them; {time_s / math.ceil(steps):.9g} s would do"
                 )
 
-    def _boundaries(self) -> list[tuple[str, float]]:
-        """Return the times at which a step has to end, with what happens then."""
-        jumps = [
-            (f"the scene {name!r} changes its force at", float(t))
+    def _ends(self) -> dict[float, str]:
+        """Return the times at which a step has to end, s, with what happens then."""
+        return {self.duration_s: "a flight ends at"} | {
+            float(t): f"the scene {name!r} changes its force at"
             for name, flight in self.flights.items()
             for t in flight.acting.jumps_s
-        ]
-        return [("a flight ends at", self.duration_s), *jumps]
+        }
 
     def steps_s(self) -> list[float]:
         """Return the steps at which other methods are tried, largest first: those that fit."""
-        times = [time_s for _, time_s in self._boundaries()]
         tried = [factor * self.dt_s for factor in (4.0, 2.0, 1.0, 0.5)]
-        return [dt for dt in tried if all(_whole(time_s / dt) for time_s in times)]
+        return [dt for dt in tried if all(_whole(time_s / dt) for time_s in self._ends())]
 
     def scene(self, body: str, name: str, dt_s: float) -> FreeScene:
         """Return a flight of a body as a scene whose moments a step of ``dt_s`` divides."""
-        flight = self.flights[name]
-        steps = round(self.duration_s / dt_s)
+        flight, steps = self.flights[name], round(self.duration_s / dt_s)
         return FreeScene(
             name=name,
             title=flight.title,
@@ -226,8 +223,6 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "energy_j": "energy, J",
 }
 """The columns of `apart`, with what people read."""
-
-PAIRS: Final = ("ours - MuJoCo", "ours - reference", "MuJoCo - reference")
 
 
 def flown(scene: FreeScene, method: Method, dt_s: float) -> State:
@@ -263,48 +258,51 @@ def compare(settings: Settings, body: str) -> tuple[Frame, Frame]:
         `QUANTITIES` of ours from MuJoCo, both sides' errors of position and attitude, and the
         verdict in words. And the differences over time: body, scene, pair, time_s, `QUANTITIES`.
     """
-    verdicts, samples = [], []
+    samples = []
     for name, flight in settings.flights.items():
         scene = settings.scene(body, name, settings.dt_s)
-        mine = flown(scene, RigidBodyMethod(settings.ours), settings.dt_s)
-        theirs = flown(scene, settings.mujoco, settings.dt_s)
-        motions = ((mine, theirs), (mine, scene.truth), (theirs, scene.truth))
-        largest = []
-        for pair, two in zip(PAIRS, motions, strict=True):
-            found = apart(*two, flight.acting.gravity_m_s2)
-            at = {"body": body, "scene": name, "pair": pair, "time_s": scene.times_s}
-            samples.append(Frame(at | found))
-            largest.append({what: float(values.max()) for what, values in found.items()})
-        verdicts.append({"body": body, "scene": name} | _verdict(settings, *largest))
-    return Frame(verdicts), concat(samples, ignore_index=True)
+        motions = {
+            "ours": flown(scene, RigidBodyMethod(settings.ours), settings.dt_s),
+            "MuJoCo": flown(scene, settings.mujoco, settings.dt_s),
+            "reference": scene.truth,
+        }
+        for a, b in itertools.combinations(motions, 2):
+            where = {"body": body, "scene": name, "pair": f"{a} - {b}", "time_s": scene.times_s}
+            found = apart(motions[a], motions[b], flight.acting.gravity_m_s2)
+            samples.append(Frame(where | found))
+    every = concat(samples, ignore_index=True)
+    largest = every.groupby(["pair", "scene"], sort=False)[list(QUANTITIES)].max()
+    between, mine, theirs = (
+        largest.loc[pair] for pair in ("ours - MuJoCo", "ours - reference", "MuJoCo - reference")
+    )
+    verdicts = Frame(
+        {
+            "body": body,
+            "scene": between.index,
+            "ours": f"ours {settings.ours.name}",
+            "mujoco": settings.mujoco.name,
+            "dt_s": settings.dt_s,
+            "duration_s": settings.duration_s,
+            **between,
+            "ours_position_error_m": mine.position_m,
+            "ours_attitude_error_rad": mine.attitude_rad,
+            "mujoco_position_error_m": theirs.position_m,
+            "mujoco_attitude_error_rad": theirs.attitude_rad,
+        }
+    )
+    verdicts["verdict"] = [_verdict(row) for row in verdicts.itertuples()]
+    return verdicts.reset_index(drop=True), every
 
 
-def _verdict(
-    settings: Settings,
-    between: Mapping[str, float],
-    mine: Mapping[str, float],
-    theirs: Mapping[str, float],
-) -> dict[str, object]:
-    """Return the largest differences, and ``agree`` or which side is further from the truth."""
-    ours, mujoco = f"ours {settings.ours.name}", settings.mujoco.name
-    what = "attitude_rad" if between["position_m"] <= AGREEMENT else "position_m"
-    sides, unit = {ours: mine[what], mujoco: theirs[what]}, what.rpartition("_")[2]
+def _verdict(row: Any) -> str:
+    """Return ``agree``, or which side is further from the truth, by what and how much."""
+    if max(row.position_m, row.attitude_rad) <= AGREEMENT:
+        return "agree"
+    unit = "rad" if row.position_m <= AGREEMENT else "m"
+    what = "attitude_error_rad" if unit == "rad" else "position_error_m"
+    sides = {row.ours: getattr(row, f"ours_{what}"), row.mujoco: getattr(row, f"mujoco_{what}")}
     right, wrong = sorted(sides, key=sides.__getitem__)
-    verdict = f"{wrong} is off by {sides[wrong]:.1e} {unit}, {right} by {sides[right]:.1e}"
-    if max(between["position_m"], between["attitude_rad"]) <= AGREEMENT:
-        verdict = "agree"
-    return {
-        "ours": ours,
-        "mujoco": mujoco,
-        "dt_s": settings.dt_s,
-        "duration_s": settings.duration_s,
-        **between,
-        "ours_position_error_m": mine["position_m"],
-        "ours_attitude_error_rad": mine["attitude_rad"],
-        "mujoco_position_error_m": theirs["position_m"],
-        "mujoco_attitude_error_rad": theirs["attitude_rad"],
-        "verdict": verdict,
-    }
+    return f"{wrong} is off by {sides[wrong]:.1e} {unit}, {right} by {sides[right]:.1e}"
 
 
 REMEDIES: Final[Mapping[str, str]] = {
@@ -322,26 +320,19 @@ def remedies(settings: Settings, body: str) -> Iterator[Frame]:
     Columns: body, scene, method, dt_s, against_mujoco_rad, error_rad, mujoco_error_rad; the
     largest angles of a flight.
     """
-    names = dict.fromkeys((settings.ours.name, *REMEDIES))
-    steps_s = settings.steps_s()
-    for dt_s in steps_s:
+    methods = {settings.ours.name: settings.ours} | {name: INTEGRATORS[name] for name in REMEDIES}
+    for dt_s in settings.steps_s():
         rows = []
         for name in settings.flights:
-            scene = settings.scene(body, name, steps_s[0])
+            scene = settings.scene(body, name, settings.steps_s()[0])
             theirs = flown(scene, settings.mujoco, dt_s)
-            for method in names:
-                mine = flown(scene, RigidBodyMethod(INTEGRATORS[method]), dt_s)
-                rows.append(
-                    {
-                        "body": body,
-                        "scene": name,
-                        "method": method,
-                        "dt_s": dt_s,
-                        "against_mujoco_rad": _angle(mine, theirs),
-                        "error_rad": _angle(mine, scene.truth),
-                        "mujoco_error_rad": _angle(theirs, scene.truth),
-                    }
-                )
+            for method, ours in methods.items():
+                mine = flown(scene, RigidBodyMethod(ours), dt_s)
+                row = {"body": body, "scene": name, "method": method, "dt_s": dt_s}
+                row["against_mujoco_rad"] = _angle(mine, theirs)
+                row["error_rad"] = _angle(mine, scene.truth)
+                row["mujoco_error_rad"] = _angle(theirs, scene.truth)
+                rows.append(row)
         yield Frame(rows)
 
 
@@ -368,41 +359,37 @@ def remedy_table(rows: Frame) -> str:
 
 _FLOOR: Final = 1e-17
 """Differences below this, nearly always exactly 0, leave the picture."""
+_MARGINS: Final = (0.9, 0.5, 1.0, 1.0)
 
 
 @chart.styled
 def draw_flights(settings: Settings, body: str, samples: Frame) -> Figure:
     """Draw the differences over time: a row for each scene, a panel for each quantity."""
-    figure, panels = chart.grid(
-        (len(settings.flights), len(QUANTITIES)),
-        f"The {body} in parallel: {settings.mujoco.name} and our {settings.ours.name}, "
-        f"dt {1e3 * settings.dt_s:g} ms",
+    ours, theirs = f"ours {settings.ours.name}", settings.mujoco.name
+    title = f"The {body} in parallel: {theirs} and our {ours[5:]}, dt {1e3 * settings.dt_s:g} ms"
+    note = (
         "Thick: how far each side is from the reference. Thin: how far they are from one another; "
-        "where a line is missing, it is 0 (under 1e-17).",
-        panel=(3.0, 2.1),
-        margins=(0.9, 0.5, 1.0, 1.0),
-        sharey="col",
+        "where a line is missing, it is 0 (under 1e-17)."
     )
-    ours, theirs = chart.colour(f"ours {settings.ours.name}"), chart.colour(settings.mujoco.name)
-    lines: dict[str, dict[str, Any]] = {
-        "ours - reference": {"label": "our own error", "color": ours, "lw": 3.6, "alpha": 0.7},
-        "MuJoCo - reference": {"label": "MuJoCo's own error", "color": theirs, "lw": 3.6},
-        "ours - MuJoCo": {"label": "difference between the two", "color": "#222222", "lw": 1.1},
-    }
-    lines["MuJoCo - reference"]["alpha"] = 0.7
-    shown = samples[list(QUANTITIES)].where(samples[list(QUANTITIES)] > _FLOOR)
-    samples = samples[["scene", "pair", "time_s"]].join(shown)
+    shape, size = (len(settings.flights), len(QUANTITIES)), (3.0, 2.1)
+    figure, panels = chart.grid(shape, title, note, panel=size, margins=_MARGINS, sharey="col")
+    lines = (
+        ("ours - reference", "our own error", chart.colour(ours), 3.6, 0.7),
+        ("MuJoCo - reference", "MuJoCo's own error", chart.colour(theirs), 3.6, 0.7),
+        ("ours - MuJoCo", "difference between the two", "#222222", 1.1, 1.0),
+    )
     for row, (name, flight) in zip(panels, settings.flights.items(), strict=True):
         row[0].set_ylabel(flight.title, fontsize=8)
-        for axes, (what, title) in zip(row, QUANTITIES.items(), strict=True):
+        for axes, (what, said) in zip(row, QUANTITIES.items(), strict=True):
             if what in REFERENCE_ERROR:
                 axes.axhspan(_FLOOR, REFERENCE_ERROR[what], color="#efefef", lw=0)
                 _draw_agreement(axes)
-            for pair, style in lines.items():
+            for pair, label, colour, width, alpha in lines:
                 one = samples[(samples.scene == name) & (samples.pair == pair)]
-                axes.plot(one.time_s, one[what], **style)
+                shown = one[what].where(one[what] > _FLOOR)
+                axes.plot(one.time_s, shown, color=colour, lw=width, alpha=alpha, label=label)
             axes.set(yscale="log", xlim=(0.0, settings.duration_s))
-            axes.set_title(title, fontsize=9, color="#555555", loc="left")
+            axes.set_title(said, fontsize=9, color="#555555", loc="left")
     chart.legend_of(figure, panels[0, 1])
     return figure
 
@@ -414,32 +401,26 @@ def _draw_agreement(axes: Axes) -> None:
 @chart.styled
 def draw_remedies(settings: Settings, body: str, rows: Frame) -> Figure:
     """Draw the attitude error against the time step: a panel for each scene, a line a method."""
-    columns = min(3, len(settings.flights))
-    figure, panels = chart.grid(
-        (math.ceil(len(settings.flights) / columns), columns),
-        f"The {body}: which part of the report's method makes its error",
-        f"largest attitude error in {settings.duration_s:g} s, rad, against the time step, ms",
-        panel=(4.6, 3.2),
-        margins=(0.9, 0.5, 1.0, 1.0),
-        sharey="all",
-    )
-    for axes, name in itertools.zip_longest(panels.ravel(), settings.flights):
-        if name is None:
-            axes.set_visible(False)
-            continue
+    title = f"The {body}: which part of the report's method makes its error"
+    note = f"largest attitude error in {settings.duration_s:g} s, rad, against the time step, ms"
+    columns, mujoco = min(3, len(settings.flights)), settings.mujoco.name
+    shape, size = (math.ceil(len(settings.flights) / columns), columns), (4.6, 3.2)
+    figure, panels = chart.grid(shape, title, note, panel=size, margins=_MARGINS, sharey="all")
+    for axes in panels.ravel()[len(settings.flights) :]:
+        axes.set_visible(False)
+    for axes, (name, flight) in zip(panels.ravel(), settings.flights.items(), strict=False):
         own = rows[rows.scene == name].assign(ms=1e3 * rows.dt_s)
-        theirs, mujoco = own.drop_duplicates("ms"), settings.mujoco.name
-        style: dict[str, Any] = {"lw": 5, "alpha": 0.5, "color": chart.colour(mujoco)}
-        axes.plot(theirs.ms, theirs.mujoco_error_rad, label=mujoco, **style)
-        for method, mine in own.groupby("method", sort=False):
+        wide = own.pivot_table("error_rad", "ms", "method", sort=False)
+        thick = own.groupby("ms").mujoco_error_rad.first()
+        axes.plot(thick, lw=5, alpha=0.5, color=chart.colour(mujoco), label=mujoco)
+        for method in wide:
             label = f"{method}: {REMEDIES[method]}" if method in REMEDIES else method
-            style = {"ms": 4, "color": chart.colour(f"ours {method}"), "label": label}
-            axes.plot(mine.ms, mine.error_rad, "o-", **style)
+            axes.plot(wide[method], "o-", ms=4, color=chart.colour(f"ours {method}"), label=label)
         _draw_agreement(axes)
         axes.set(xscale="log", yscale="log")
-        axes.set_xticks(theirs.ms, [f"{ms:g}" for ms in theirs.ms])
+        axes.set_xticks(wide.index, [f"{ms:g}" for ms in wide.index])
         axes.minorticks_off()
-        axes.set_title(settings.flights[name].title, fontsize=10, loc="left")
+        axes.set_title(flight.title, fontsize=10, loc="left")
     chart.legend_of(figure, panels[0, 0])
     return figure
 
