@@ -35,20 +35,12 @@ SCENES: Final[tuple[Scene, ...]] = (*FREE_SCENES, *CONTACT_SCENES)
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How much a run does.
+    """How much a run does."""
 
-    Attributes:
-        quick: shorter free motions and coarser orders.
-        repeats: timings of which the median is taken.
-        rigid_body_evaluations: most evaluations of the forces in a run of our own integrators;
-            smaller time steps are left out.
-        time_steps: most time steps of a scene of contact, the largest ones.
-    """
-
-    quick: bool
-    repeats: int
-    rigid_body_evaluations: int
-    time_steps: int | None = None
+    quick: bool  # shorter free motions and coarser orders
+    repeats: int  # timings of which the median is taken
+    rigid_body_evaluations: int  # most of a run of our own integrators; smaller steps are left out
+    time_steps: int | None = None  # most of a scene of contact, the largest ones
 
 
 FULL: Final = Effort(quick=False, repeats=REPEATS, rigid_body_evaluations=400_000)
@@ -190,19 +182,12 @@ def draw_step_costs(costs: Frame) -> Any:
 
 @dataclass(frozen=True)
 class Results:
-    """What was measured of some scenes.
+    """What was measured of some scenes."""
 
-    Attributes:
-        scenes: as they were run.
-        points: rows of `roller_env.lab.scene.measure`.
-        orders: rows of `roller_env.lab.orders.measured_orders`, of the free scenes.
-        costs: of a step, for many bodies at a time; empty without free scenes.
-    """
-
-    scenes: Sequence[Scene]
-    points: Frame
-    orders: Frame
-    costs: Frame
+    scenes: Sequence[Scene]  # as they were run
+    points: Frame  # of `roller_env.lab.scene.measure`
+    orders: Frame  # of `roller_env.lab.orders.measured_orders`, of the free scenes
+    costs: Frame  # of `step_costs`; empty without free scenes
 
     def charted(self, kind: ErrorKind) -> dict[str, chart.Plot]:
         """Return the first error of a kind of every scene that has one, by the scene's name."""

@@ -136,23 +136,14 @@ def plain(axis: Any) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One row of `against_limits`.
-
-    Attributes:
-        label: what it is.
-        value: on the axis; NaN where it was not measured.
-        span: smallest and largest, which are drawn as a line; or what is allowed.
-        good: whether it is on the right side.
-        series: of several, by whose colour it is drawn; empty for good or not.
-        said: what is written right of it.
-    """
+    """One row of `against_limits`."""
 
     label: str
-    value: float
-    span: tuple[float, float] = (math.nan, math.nan)
-    good: bool = True
-    series: str = ""
-    said: str = ""
+    value: float  # NaN where it was not measured
+    span: tuple[float, float] = (math.nan, math.nan)  # smallest and largest, or what is allowed
+    good: bool = True  # whether it is on the right side
+    series: str = ""  # of several, by whose colour it is drawn; empty for good or not
+    said: str = ""  # right of it
 
 
 @styled
@@ -222,19 +213,12 @@ _SHOWN: Final = (1e-16, 1e12)
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """One scene's error to be drawn.
+    """One scene's error to be drawn."""
 
-    Attributes:
-        title: of the scene.
-        label: of the error's axis.
-        points: of the error, rows of `roller_env.lab.scene.measure`.
-        limits_s: method and the time step above which it is predicted to blow up.
-    """
-
-    title: str
-    label: str
-    points: Frame
-    limits_s: Mapping[str, float]
+    title: str  # of the scene
+    label: str  # of the error's axis
+    points: Frame  # of the error, rows of `roller_env.lab.scene.measure`
+    limits_s: Mapping[str, float]  # time step above which a method is predicted to blow up
 
     def curves(self) -> dict[str, Frame]:
         """Return every method's sound points, smallest step first."""

@@ -29,7 +29,6 @@ from roller_env.rigid_body import Body, PiecewiseConstantForce, State, exact, qu
 from roller_env.rigid_body.arrays import Float64, dot
 
 Vector = tuple[float, float, float]
-
 _STILL: Final[Vector] = (0.0, 0.0, 0.0)
 
 
@@ -40,29 +39,32 @@ class Acting:
     gravity_m_s2: Vector = _STILL
     force_n: Vector = _STILL
     torque_nm: Vector = _STILL
-    drag_n_s_m: float = 0.0
-    """c of the force -c v."""
-    spin_damping_nm_s: float = 0.0
-    """c of the torque -c omega."""
-    held: PiecewiseConstantForce | None = None
-    """Keys or a lift: a force that changes by jumps, held through every step."""
+    drag_n_s_m: float = 0.0  # c of the force -c v
+    spin_damping_nm_s: float = 0.0  # c of the torque -c omega
+    held: PiecewiseConstantForce | None = None  # keys or a lift, held through every step
 
     @property
     def turns(self) -> bool:
         """Whether any torque acts."""
         return any(self.torque_nm) or self.spin_damping_nm_s != 0.0
 
+    @property
+    def jumps_s(self) -> Float64:
+        """Times at which the held force jumps, rising."""
+        return np.empty(0) if self.held is None else self.held.switches_s
+
     def load(self) -> rigid_body.Load:
         """Return it for our integrators; what is zero costs nothing."""
-        loads: list[rigid_body.Load] = []
-        if any(self.gravity_m_s2):
-            loads.append(rigid_body.gravity(self.gravity_m_s2))
-        if any(self.force_n):
-            loads.append(rigid_body.constant(force=self.force_n))
-        if self.drag_n_s_m:
-            loads.append(rigid_body.linear_drag(self.drag_n_s_m))
-        if self.turns:
-            loads.append(rigid_body.driving_torque(self.torque_nm, self.spin_damping_nm_s))
+        loads = [
+            load
+            for acts, load in (
+                (any(self.gravity_m_s2), rigid_body.gravity(self.gravity_m_s2)),
+                (any(self.force_n), rigid_body.constant(force=self.force_n)),
+                (self.drag_n_s_m, rigid_body.linear_drag(self.drag_n_s_m)),
+                (self.turns, rigid_body.driving_torque(self.torque_nm, self.spin_damping_nm_s)),
+            )
+            if acts
+        ]
         return loads[0] if len(loads) == 1 else rigid_body.total(*loads)
 
     def apply(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -73,20 +75,13 @@ class Acting:
         acts along body axes in rotation; being the same on every axis it is -c omega in any.
         """
         model.opt.gravity[:] = self.gravity_m_s2
-        model.dof_damping[:3] = self.drag_n_s_m
-        model.dof_damping[3:] = self.spin_damping_nm_s
-        data.xfrc_applied[1, :3] = self.force_n
-        data.xfrc_applied[1, 3:] = self.torque_nm
+        model.dof_damping[:] = np.repeat([self.drag_n_s_m, self.spin_damping_nm_s], 3)
+        data.xfrc_applied[1] = (*self.force_n, *self.torque_nm)
 
     def hold(self, data: mujoco.MjData, t: float) -> None:
         """Let what is held at ``t`` act on the only body of a compiled model."""
         if self.held is not None:
             data.xfrc_applied[1, :3] = self.held.force_at_time(t) + self.force_n
-
-    @property
-    def jumps_s(self) -> Float64:
-        """Times at which the held force jumps, rising."""
-        return np.empty(0) if self.held is None else self.held.switches_s
 
 
 def _sizes(values: Float64) -> Float64:
@@ -143,21 +138,15 @@ class FreeScene:
 
     name: str
     title: str
-    start: State
-    """One body at time 0."""
-    quantities: tuple[str, ...]
-    """What is measured of `QUANTITIES`; the first is what the chart shows."""
-    time_steps_s: Sequence[float]
-    """Largest first. Each divides the time between two moments."""
+    start: State  # one body at time 0
+    quantities: tuple[str, ...]  # of `QUANTITIES`; a chart shows the first
+    time_steps_s: Sequence[float]  # largest first; each divides the time between two moments
     acting: Acting = Acting()
     horizon_s: float = 10.0
     methods: Sequence[Method] = FREE
-    failure: float = 1.0
-    """An error as large as the motion itself (or a radian): nothing is left of the answer."""
-    limits_s: Mapping[str, float] = field(default_factory=dict)
-    """Time step above which theory expects a method to blow up, by its name."""
-    moments: int = 10
-    """Moments of a run at which the error is taken, evenly to its end."""
+    failure: float = 1.0  # an error as large as the motion (or a radian): nothing is left of it
+    limits_s: Mapping[str, float] = field(default_factory=dict)  # by a method's name: see `DRAG`
+    moments: int = 10  # at which the error is taken, evenly to the end
 
     @property
     def measures(self) -> Sequence[Measure]:
@@ -184,25 +173,15 @@ class FreeScene:
         return turned.recalculate(position=moved.position, momentum=moved.momentum)
 
     def steps_to_a_moment(self, dt_s: float) -> int:
-        """Return the steps from one moment to the next.
-
-        Raises:
-            ValueError: when the time step does not divide that time.
-        """
+        """Return the steps from one moment to the next, or raise a ValueError if none fit."""
         steps = round(self.moment_s / dt_s) if dt_s > 0.0 else 0
         if steps < 1 or not math.isclose(steps * dt_s, self.moment_s, rel_tol=1e-9):
-            raise ValueError(
-                f"{self.name}: the time step must divide {self.moment_s:g} s (a moment of the "
-                f"{self.moments}), found {dt_s:g} s"
-            )
+            moment = f"{self.moment_s:g} s (a moment of the {self.moments})"
+            raise ValueError(f"{self.name}: the time step must divide {moment}, found {dt_s:g} s")
         return steps
 
     def trial(self, method: Method, dt_s: float) -> FreeTrial:
-        """See `Scene.trial`.
-
-        Raises:
-            ValueError: when ``dt_s`` does not divide the time between two moments.
-        """
+        """See `Scene.trial`; a ``dt_s`` that does not divide `moment_s` is a ValueError."""
         if isinstance(method, RigidBodyMethod):
             return _RigidBodyTrial(self, method, dt_s)
         return _MujocoTrial(self, method, dt_s)

@@ -59,23 +59,14 @@ def make_level(**pieces: Any) -> Level:
 
 @dataclass(frozen=True)
 class Course:
-    """A compiled level and where its ball begins.
-
-    Attributes:
-        compiled: the level.
-        at: of the ball's centre, m.
-        velocity: of the ball, m/s.
-        spin: rad/s, world frame.
-        force_n: held on the ball, N.
-        movers_m_s: velocity of every plate and gate, m/s, up positive.
-    """
+    """A compiled level and where its ball begins."""
 
     compiled: CompiledLevel
-    at: Sequence[float]
-    velocity: Sequence[float] = (0.0, 0.0, 0.0)
-    spin: Sequence[float] = (0.0, 0.0, 0.0)
-    force_n: Sequence[float] = (0.0, 0.0, 0.0)
-    movers_m_s: float = 0.0
+    at: Sequence[float]  # the ball's centre, m
+    velocity: Sequence[float] = (0.0, 0.0, 0.0)  # m/s
+    spin: Sequence[float] = (0.0, 0.0, 0.0)  # rad/s, world frame
+    force_n: Sequence[float] = (0.0, 0.0, 0.0)  # held on the ball
+    movers_m_s: float = 0.0  # of every plate and gate, up positive
 
     def prepare(self, data: mujoco.MjData) -> None:
         """Put ``data`` to the beginning."""
@@ -96,22 +87,13 @@ class Course:
 
 @dataclass(frozen=True)
 class Run:
-    """What the ball did.
+    """What the ball did."""
 
-    Attributes:
-        time_s: (n,).
-        position: (n, 3) m.
-        velocity: (n, 3) m/s.
-        energy: (n,) J for each kg: of motion, of spin and of height, less the held force's work.
-        depth: (n,) of the deepest contact, m; 0 in the air.
-        finite: whether all of it is.
-    """
-
-    time_s: Float64
-    position: Float64
-    velocity: Float64
-    energy: Float64
-    depth: Float64
+    time_s: Float64  # (n,)
+    position: Float64  # (n, 3) m
+    velocity: Float64  # (n, 3) m/s
+    energy: Float64  # (n,) J a kg: of motion, spin and height, less the held force's work
+    depth: Float64  # (n,) of the deepest contact, m; 0 in the air
     finite: bool
 
     @property

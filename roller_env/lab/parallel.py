@@ -63,18 +63,11 @@ BODIES: Final[Mapping[str, Body]] = {
 
 @dataclass(frozen=True)
 class Flight:
-    """How a flight begins, and what acts.
-
-    Attributes:
-        title: what people read.
-        velocity_m_s: at the start, world axes.
-        spin_rad_s: angular velocity at the start, **body** axes: that is where a box's axes differ.
-        acting: forces and torques.
-    """
+    """How a flight begins, and what acts."""
 
     title: str
-    velocity_m_s: Vector
-    spin_rad_s: Vector
+    velocity_m_s: Vector  # world axes
+    spin_rad_s: Vector  # **body** axes: that is where a box's axes differ
     acting: Acting
 
     def start(self, body: Body) -> State:
@@ -150,24 +143,16 @@ def parsed_keys(events: Iterable[str]) -> PiecewiseConstantForce:
 class Settings:
     """What to compare.
 
-    Attributes:
-        bodies: names in `BODIES`.
-        flights: by name.
-        ours: a method of ours.
-        mujoco: a method of MuJoCo's.
-        dt_s: step of both, s.
-        duration_s: of every flight, s.
-
     Raises:
         ValueError: when a flight or the time between two jumps is no whole number of steps.
     """
 
-    bodies: tuple[str, ...]
+    bodies: tuple[str, ...]  # names in `BODIES`
     flights: Mapping[str, Flight]
     ours: Integrator
     mujoco: MujocoMethod
-    dt_s: float
-    duration_s: float
+    dt_s: float  # of both
+    duration_s: float  # of every flight
 
     def __post_init__(self) -> None:
         positive_time("dt", self.dt_s)

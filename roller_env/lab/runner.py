@@ -78,17 +78,11 @@ def interleaved(
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """How long an interleaved run is.
+    """How long an interleaved run is."""
 
-    Attributes:
-        rounds: times that every case has its turn; medians are over these.
-        round_s: about how long one turn lasts, wall seconds.
-        warm_up_s: game time before the first round, so that the states have spread.
-    """
-
-    rounds: int
-    round_s: float
-    warm_up_s: float
+    rounds: int  # turns of every case; medians are over these
+    round_s: float  # about how long one turn lasts, wall
+    warm_up_s: float  # game time before the first round, so that the states have spread
 
     def __post_init__(self) -> None:
         """Refuse what measures nothing."""
@@ -105,7 +99,7 @@ class Case(ABC):
     Attributes:
         name: what tables call it.
         env_steps: environment steps in one of its steps, such as the number of environments.
-        simulated_s: simulated time of one environment step; NaN where that means nothing.
+        simulated_s: simulated time of one environment step.
         steps_done: its steps so far.
     """
 

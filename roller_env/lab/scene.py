@@ -18,17 +18,11 @@ ErrorKind = Literal["discretisation", "model"]
 
 @dataclass(frozen=True, slots=True)
 class Measure:
-    """One error that a scene measures.
+    """One error that a scene measures."""
 
-    Attributes:
-        name: its key in `SteadyTrial.errors`.
-        label: what an axis or a column says, with the unit: ``position error after 10 s, m``.
-        kind: against the same model with a vanishing step, or against the rigid closed form.
-    """
-
-    name: str
-    label: str
-    kind: ErrorKind
+    name: str  # its key in `SteadyTrial.errors`
+    label: str  # of an axis, with the unit: ``position error after 10 s, m``
+    kind: ErrorKind  # against the same model with a vanishing step, or the rigid closed form
 
 
 @runtime_checkable

@@ -104,26 +104,15 @@ def judge(comparison: str, sense: Sense, goal: float, values: Sequence[float]) -
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What is run.
-
-    Attributes:
-        config: how long.
-        options: of all our environments, see `roller_env.config.EnvConfig`.
-        num_envs: of the vectors.
-        num_threads: native threads of the vectors, EnvPool's among them.
-        training_envs: of the PPO that compares `RollerVecEnv` with `SubprocVecEnv`: that many
-            processes.
-        training: what ``make train`` trains.
-        peers: Python with the peers installed; None leaves them out.
-    """
+    """What is run."""
 
     config: runner.Config
-    options: Mapping[str, Any]
-    num_envs: int
-    num_threads: int
-    training_envs: int
-    training: TrainingConfig
-    peers: Path | None
+    options: Mapping[str, Any]  # of all our environments, see `roller_env.config.EnvConfig`
+    num_envs: int  # of the vectors
+    num_threads: int  # native threads of the vectors, EnvPool's among them
+    training_envs: int  # of `RollerVecEnv` against `SubprocVecEnv`: that many processes
+    training: TrainingConfig  # what ``make train`` trains
+    peers: Path | None  # Python with the peers installed; None leaves them out
 
     def __post_init__(self) -> None:
         """Refuse options that no environment takes."""

@@ -179,23 +179,15 @@ def resident_gb() -> float:
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What is measured.
+    """What is measured."""
 
-    Attributes:
-        config: of every interleaved run.
-        sizes: of every axis, as `SIZES` has them.
-        options: of the environments where an axis does not say otherwise; ``level`` is a name.
-        num_envs: likewise.
-        num_threads: likewise.
-        leak_steps: environment steps of the long run.
-    """
-
-    config: Config
-    sizes: Mapping[str, tuple[int, ...]]
+    config: Config  # of every interleaved run
+    sizes: Mapping[str, tuple[int, ...]]  # as in `SIZES`
+    # Where an axis does not say otherwise; ``level`` is a name.
     options: Mapping[str, Any]
     num_envs: int
     num_threads: int
-    leak_steps: int
+    leak_steps: int  # environment steps of the long run
 
     def __post_init__(self) -> None:
         """Refuse options that no environment takes."""

@@ -401,21 +401,13 @@ def errors_of(setting: Setting, reference_hz: int = REFERENCE_HZ) -> Errors:
 
 
 class Requirement(NamedTuple):
-    """What the game can bear.
+    """What the game can bear."""
 
-    Attributes:
-        name: in `Errors`.
-        title: for tables and charts.
-        limit: largest bearable value.
-        reason: why that.
-        unit: of the limit; empty for shares.
-    """
-
-    name: str
-    title: str
-    limit: float
+    name: str  # in `Errors`
+    title: str  # for tables and charts
+    limit: float  # largest bearable value
     reason: str
-    unit: str = ""
+    unit: str = ""  # of the limit; empty for shares
 
 
 _ASKED: Final = "asked of the default preset"

@@ -75,21 +75,13 @@ def costs(games: Mapping[str, Games], rounds: int) -> dict[str, dict[str, float]
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How much is measured.
+    """How much is measured."""
 
-    Attributes:
-        settings: names in the catalogue.
-        reference_hz: steps a second of the converged model.
-        rounds: turns over which costs are medians.
-        boxes: sizes of the levels of boxes.
-        games: that are stepped together where costs are measured.
-    """
-
-    settings: tuple[str, ...]
-    reference_hz: int
-    rounds: int
-    boxes: tuple[int, ...]
-    games: int
+    settings: tuple[str, ...]  # names in the catalogue
+    reference_hz: int  # steps a second of the converged model
+    rounds: int  # turns over which costs are medians
+    boxes: tuple[int, ...]  # of the levels of boxes
+    games: int  # that are stepped together where costs are measured
 
 
 FULL: Final = Effort(tuple(SETTINGS), REFERENCE_HZ, 15, (60, 100, 200, 300, 600), 64)

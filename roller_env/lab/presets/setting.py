@@ -27,32 +27,20 @@ ENUMS: Final[Mapping[str, Mapping[Option, int]]] = {
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """How the game's levels are simulated.
+    """How the game's levels are simulated."""
 
-    Attributes:
-        name: what tables and charts call it.
-        knob: what it is about; settings of one knob form a group.
-        preset: the settings that the product can be given.
-        options: further fields of MuJoCo's ``mjOption``, by name; enumerations by MuJoCo's name.
-        flags: MuJoCo's flags that differ from the compiler's, by name, and whether they are on.
-        contacts_at_s: the time step that contacts are calibrated for; None for the preset's own.
-        stiffness: factor of the rate B of the plastic contacts; the spring goes with its square.
-        impedance: of all contacts; None for the product's.
-        friction_steps: share of the slip that a step removes; makes explicit contact pairs, which
-            alone can have it differ from the share of the approach (`DAMPING_STEPS`).
-        pairs: whether the ball's contacts are explicit pairs instead of contact bits.
-    """
-
-    name: str
-    knob: str
-    preset: PhysicsPreset = PRESETS["default"]
-    options: tuple[tuple[str, Option], ...] = ()
-    flags: tuple[tuple[str, bool], ...] = ()
-    contacts_at_s: float | None = None
-    stiffness: float = 1.0
-    impedance: float | None = None
+    name: str  # what tables and charts call it
+    knob: str  # what it is about; settings of one knob form a group
+    preset: PhysicsPreset = PRESETS["default"]  # what the product can be given
+    options: tuple[tuple[str, Option], ...] = ()  # further fields of MuJoCo's ``mjOption``
+    flags: tuple[tuple[str, bool], ...] = ()  # MuJoCo's that differ from the compiler's
+    contacts_at_s: float | None = None  # step that contacts are made for, if not the preset's
+    stiffness: float = 1.0  # factor of plastic contacts' rate B; the spring goes with its square
+    impedance: float | None = None  # of all contacts, if not the product's
+    # Share of the slip that a step removes, if not that of the approach (`DAMPING_STEPS`). Only
+    # explicit contact pairs can have it differ.
     friction_steps: float | None = None
-    pairs: bool = False
+    pairs: bool = False  # explicit contact pairs instead of contact bits
 
     def compile(self, level: Level) -> CompiledLevel:
         """Return the level compiled with this setting."""
