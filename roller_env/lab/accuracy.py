@@ -8,6 +8,7 @@ which the time step is halved, the table of orders.
 from __future__ import annotations
 
 import math
+import statistics
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -132,7 +133,7 @@ def accurate_steps(points: Frame) -> Frame:
 
 BATCHES: Final = (1, 1000)
 """Bodies that advance in one call of ours."""
-_COST_STEP_S: Final = 1e-3
+_COST_STEPS: Final = 20_000
 
 
 def step_costs(repeats: int) -> Frame:
@@ -142,21 +143,16 @@ def step_costs(repeats: int) -> Frame:
         ``method``, ``bodies`` that advance in one call, ``us_per_body_step`` (median) and
         ``us_per_body_evaluation``.
     """
-    trials = {}
+    turns: dict[tuple[Method, int], Callable[[], float]] = {}
     for method in FREE:
         for bodies in BATCHES if isinstance(method, RigidBodyMethod) else (1,):
             thrown = replace(COMPLEX_BOX, start=COMPLEX_BOX.start.take([0] * bodies))
-            trials[method, bodies] = thrown.trial(method, _COST_STEP_S)
-    turns = {
-        f"{method.name} {bodies}": partial(timed, trial.run_part, time.thread_time)
-        for (method, bodies), trial in trials.items()
-    }
-    for warm_up in turns.values():
-        warm_up()
-    median_s = Frame(interleaved(turns, repeats)).median()
+            work = partial(thrown.trial(method, 1e-3).simulate, _COST_STEPS // bodies, 1)
+            work()
+            turns[method, bodies] = partial(timed, work, time.thread_time)
     rows = []
-    for (method, bodies), trial in trials.items():
-        us = 1e6 * median_s[f"{method.name} {bodies}"] * _COST_STEP_S / trial.part_s / bodies
+    for (method, bodies), seconds in interleaved(turns, repeats).items():
+        us = 1e6 * statistics.median(seconds) / _COST_STEPS
         row = {"method": method.name, "bodies": bodies, "us_per_body_step": us}
         rows.append(row | {"us_per_body_evaluation": us / method.evaluations})
     return Frame(rows)

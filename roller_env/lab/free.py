@@ -250,7 +250,7 @@ class FreeTrial(ABC):
         self._steps, self.part_s = scene.steps_to_a_moment(dt_s), part_steps * dt_s
 
     @abstractmethod
-    def _simulate(self, steps: int, moments: int) -> None:
+    def simulate(self, steps: int, moments: int) -> None:
         """Go from the start to so many moments, so many steps apart."""
 
     @property
@@ -260,11 +260,11 @@ class FreeTrial(ABC):
 
     def run(self) -> None:
         """See `SteadyTrial.run`."""
-        self._simulate(self._steps, self._scene.moments)
+        self.simulate(self._steps, self._scene.moments)
 
     def run_part(self) -> None:
         """See `SteadyTrial.run_part`."""
-        self._simulate(self._part_steps, 1)
+        self.simulate(self._part_steps, 1)
 
     def errors(self) -> dict[str, float]:
         """See `SteadyTrial.errors`."""
@@ -276,10 +276,10 @@ class _RigidBodyTrial(FreeTrial):
     """One run of one of our integrators."""
 
     def __init__(self, scene: FreeScene, method: RigidBodyMethod, dt_s: float) -> None:
-        super().__init__(scene, dt_s, max(1, 5000 // scene.start.count))
+        super().__init__(scene, dt_s, 5000)
         self._integrator, self._load = method.integrator, scene.acting.load()
 
-    def _simulate(self, steps: int, moments: int) -> None:
+    def simulate(self, steps: int, moments: int) -> None:
         path, how = [self._scene.start], (self._integrator, self._dt_s, steps)
         held = self._scene.acting.held
         with np.errstate(all="ignore"):
@@ -303,7 +303,7 @@ class _MujocoTrial(FreeTrial):
         self._model = free_model(scene.start.body, method, dt_s)
         self._data = mujoco.MjData(self._model)
 
-    def _simulate(self, steps: int, moments: int) -> None:
+    def simulate(self, steps: int, moments: int) -> None:
         model, data, acting = self._model, self._data, self._scene.acting
         mujoco.mj_resetData(model, data)
         acting.apply(model, data)

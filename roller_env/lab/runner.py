@@ -19,12 +19,14 @@ from difflib import get_close_matches
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
 from pandas import DataFrame as Frame
 
 from roller_env import __version__
+
+Name = TypeVar("Name")
 
 REPEATS: Final = 7
 """Repetitions of which the median is taken."""
@@ -53,8 +55,8 @@ def spread(values: Sequence[float]) -> float:
 
 
 def interleaved(
-    runs: Mapping[str, Callable[[], float]], rounds: int, *, shuffled: bool = False
-) -> dict[str, tuple[float, ...]]:
+    runs: Mapping[Name, Callable[[], float]], rounds: int, *, shuffled: bool = False
+) -> dict[Name, tuple[float, ...]]:
     """Let ``runs``, each of which returns its seconds, take turns; return them round by round.
 
     Args:
@@ -63,7 +65,7 @@ def interleaved(
         shuffled: in another order every round: who comes after the dearest, or while the machine is
             slow, would otherwise be the same every time.
     """
-    seconds: dict[str, list[float]] = {name: [] for name in runs}
+    seconds: dict[Name, list[float]] = {name: [] for name in runs}
     order, random = list(runs), np.random.default_rng(0)
     for _ in range(rounds):
         if shuffled:

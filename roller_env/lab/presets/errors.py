@@ -15,7 +15,7 @@ from roller_env.config import EnvConfig
 from roller_env.game.actions import forces, held_keys
 from roller_env.lab import game
 from roller_env.lab.game import DECK_M, GRAVITY_M_S2, LIFT_N, LIFT_S, RADIUS_M, THROUGH_M
-from roller_env.lab.presets.setting import Setting
+from roller_env.lab.presets.settings import Setting
 from roller_env.lab.stability.failures import hanging_gate_level, seam_level
 from roller_env.level import Level, load_level
 from roller_env.physics.presets import PhysicsPreset

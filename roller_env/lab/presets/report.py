@@ -1,11 +1,12 @@
-"""Files of a run: tables, charts, and a page that says what was found."""
+"""The experiment of ``scripts/presets.py``: errors beside costs, as tables, charts and a page."""
 
 from __future__ import annotations
 
 import math
 import shutil
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,11 +15,78 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 from roller_env.lab import chart, table
-from roller_env.lab.presets.ablations import AS_CHOSEN
-from roller_env.lab.presets.errors import REQUIREMENTS, Requirement
+from roller_env.lab.methods import without_warnings
+from roller_env.lab.presets.costs import AS_CHOSEN, Games, costs
+from roller_env.lab.presets.errors import REFERENCE_HZ, REQUIREMENTS, errors_of, violations
+from roller_env.lab.presets.settings import FEW, SETTINGS
 from roller_env.lab.runner import header
 from roller_env.lab.table import Frame, markdown
+from roller_env.level import load_level
 from roller_env.physics.presets import PRESETS
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """How much is measured."""
+
+    settings: tuple[str, ...]  # names in the catalogue
+    reference_hz: int  # steps a second of the converged model
+    rounds: int  # turns over which costs are medians
+    boxes: tuple[int, ...]  # of the levels of boxes
+    games: int  # that are stepped together where costs are measured
+
+
+FULL: Final = Effort(tuple(SETTINGS), REFERENCE_HZ, 15, (60, 100, 200, 300, 600), 64)
+QUICK: Final = Effort(FEW, reference_hz=1920, rounds=2, boxes=(60, 200), games=4)
+
+
+def measure(effort: Effort, watched: Callable[[Sequence[str]], Iterable[str]]) -> Frame:
+    """Measure all settings.
+
+    Args:
+        effort: how much.
+        watched: goes over names while showing progress.
+
+    Returns:
+        A row a setting, the cheapest first: the errors of `roller_env.lab.presets.errors`;
+        ``setting``, ``knob``, ``dt_s``; ``us_per_step`` (CPU, on the classic level) and
+        ``cpu_s_per_s`` (of a simulated second of one game) with their ``spread``; ``violations``,
+        the requirements that it does not meet; ``front``: whether it meets all, and none that does
+        is both cheaper and truer on the course.
+    """
+    settings, level = {name: SETTINGS[name] for name in effort.settings}, load_level("classic")
+    with without_warnings():
+        errors = {
+            name: errors_of(settings[name], effort.reference_hz) for name in watched(list(settings))
+        }
+        games = {
+            name: Games(setting.compile(level).model, level, effort.games)
+            for name, setting in settings.items()
+        }
+        taken = costs(games, effort.rounds)
+    rows = Frame([errors[name] | taken[name] for name in settings])
+    rows["setting"] = list(settings)
+    rows["knob"] = [setting.knob for setting in settings.values()]
+    rows["dt_s"] = [setting.preset.dt_s for setting in settings.values()]
+    rows["cpu_s_per_s"] = 1e-6 * rows.us_per_step / rows.dt_s
+    found = [violations(errors[name]) for name in settings]
+    rows["violations"] = ["; ".join(one.title for one in own) for own in found]
+    sound = rows[rows.violations == ""]
+    best = front({row.setting: (row.cpu_s_per_s, row.course) for row in sound.itertuples()})
+    rows["front"] = rows.setting.isin(best)
+    return rows.sort_values("cpu_s_per_s", ignore_index=True)
+
+
+def front(points: Mapping[str, tuple[float, float]]) -> set[str]:
+    """Return the names of the points that no other is below in one and not above in the other."""
+    return {
+        name
+        for name, (x, y) in points.items()
+        if not any(a <= x and b <= y and (a, b) != (x, y) for a, b in points.values())
+    }
+
+
+# --- files -----------------------------------------------------------------------------------
 
 _COLUMNS: Final[Mapping[str, tuple[str, float]]] = {
     "µs a step": ("us_per_step", 1.0),
@@ -219,7 +287,11 @@ def draw_requirements(settings: Frame) -> Figure:
     for (y, x), share in np.ndenumerate(shares):
         ink = "white" if share > 1.0 else "#333333"
         axes.text(x, y, _written(share), ha="center", va="center", fontsize=7.5, color=ink)
-    axes.set_xticks(range(len(REQUIREMENTS)), map(_heading, REQUIREMENTS), fontsize=7.5)
+    heads = [
+        "\n".join([*textwrap.wrap(one.title, 11), f"≤ {one.limit:.3g} {one.unit}".rstrip()])
+        for one in REQUIREMENTS
+    ]
+    axes.set_xticks(range(len(heads)), heads, fontsize=7.5)
     axes.xaxis.tick_top()
     axes.set_yticks(range(len(order)), order.setting, fontsize=8.5)
     axes.axhline(first.sum() - 0.5, color="white", linewidth=5.0)
@@ -227,11 +299,6 @@ def draw_requirements(settings: Frame) -> Figure:
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
     return figure
-
-
-def _heading(requirement: Requirement) -> str:
-    limit = f"≤ {requirement.limit:.3g} {requirement.unit}".rstrip()
-    return "\n".join([*textwrap.wrap(requirement.title, 11), limit])
 
 
 def _written(share: float) -> str:
