@@ -98,15 +98,10 @@ def grid(
     margins: tuple[float, float, float, float] = (0.9, 0.5, 1.0, 0.7),
     **subplots: Any,
 ) -> tuple[Figure, npt.NDArray[Any]]:
-    """Return a page of panels under a headline, and its panels (rows, columns).
+    """Return a page of panels, (rows, columns), under a headline and a note.
 
-    Args:
-        shape: rows and columns.
-        title: the headline.
-        note: a line below it, broken where it is too long.
-        panel: width and height of a panel, inches.
-        margins: left, right, top and bottom of the page, inches.
-        **subplots: further arguments of ``Figure.subplots``.
+    ``panel`` is a panel's width and height, ``margins`` are the page's left, right, top and bottom,
+    inches; the other arguments are of ``Figure.subplots``.
     """
     rows, columns = shape
     left, right, top, bottom = margins

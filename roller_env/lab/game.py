@@ -141,12 +141,7 @@ def play(course: Course, seconds: float) -> Run:
 def played(
     config: EnvConfig, keys: Sequence[tuple[str, float]], seed: int
 ) -> tuple[Float64, Float64]:
-    """Play keys through the product's own simulation, rules and all.
-
-    Args:
-        config: of the game.
-        keys: of ``wasd``, and for how many seconds each are held.
-        seed: by which the ball's place at the start is drawn.
+    """Play keys of ``wasd``, each for some seconds, through the product's own simulation.
 
     Returns:
         Where the ball began, (3,) m, and what the actuators did in each control step, (steps, nu),

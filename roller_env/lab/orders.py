@@ -78,13 +78,8 @@ def agrees(theory: float, measured: float) -> bool:
 def slope(steps_s: Sequence[float], errors: Sequence[float]) -> tuple[float, float, float]:
     """Return the order that errors show, and the smallest and largest time step it is taken over.
 
-    Args:
-        steps_s: time steps, each half of the one before.
-        errors: one a step.
-
-    Returns:
-        `EXACT` when every error is under `FLOOR`; NaN when fewer than four in a row are above it,
-        or one of those is not finite.
+    Each step is half of the one before. `EXACT` when every error is under `FLOOR`; NaN when fewer
+    than four in a row are above it, or one of those is not finite.
     """
     above = [k for k, error in enumerate(errors) if not error <= FLOOR]
     if not above:

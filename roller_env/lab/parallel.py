@@ -40,9 +40,10 @@ from roller_env.rigid_body.arrays import Float64, positive_time
 AGREEMENT: Final = 1e-9
 """The two sides agree when position, m, and attitude, rad, stay within this of one another."""
 
-REFERENCE_ERROR: Final[Mapping[str, float]] = {"position_m": 5e-13, "attitude_rad": 5e-13}
-"""What the reference itself may be wrong by in 10 s. Measured against 40 digits: 2.2e-13 rad for
-the thrown box, whose closed form is next to its separatrix, and at most 1.3e-13 rad else."""
+REFERENCE_ERROR: Final = 5e-13
+"""What the reference's position, m, and attitude, rad, may be wrong by in 10 s. Measured against 40
+digits: 2.2e-13 rad for the thrown box, whose closed form is next to its separatrix, and at most
+1.3e-13 rad else."""
 
 MOMENTS: Final = 100
 """At most so many moments of a flight are compared; the last step always is."""
@@ -69,16 +70,6 @@ class Flight:
     velocity_m_s: Vector  # world axes
     spin_rad_s: Vector  # **body** axes: that is where a box's axes differ
     acting: Acting
-
-    def start(self, body: Body) -> State:
-        """Return the state in which ``body``, one of `BODIES`, begins."""
-        q = np.array([START_ORIENTATION])
-        return State.create(
-            body,
-            orientation=START_ORIENTATION,
-            velocity=self.velocity_m_s,
-            angular_velocity=quaternion.rotate(q, np.array([self.spin_rad_s])),
-        )
 
 
 KEYS_HELD: Final = ((0.0, "W"), (1.0, "WA"), (2.5, "A"), (4.0, "SD"), (6.5, "D"), (8.0, ""))
@@ -181,10 +172,14 @@ class Settings:
     def scene(self, body: str, name: str, dt_s: float) -> FreeScene:
         """Return a flight of a body as a scene whose moments a step of ``dt_s`` divides."""
         flight, steps = self.flights[name], round(self.duration_s / dt_s)
+        q = np.array([START_ORIENTATION])
+        spin = quaternion.rotate(q, np.array([flight.spin_rad_s]))
         return FreeScene(
             name=name,
             title=flight.title,
-            start=flight.start(BODIES[body]),
+            start=State.create(
+                BODIES[body], orientation=q, velocity=flight.velocity_m_s, angular_velocity=spin
+            ),
             quantities=(),
             time_steps_s=(),
             acting=flight.acting,
@@ -366,8 +361,8 @@ def draw_flights(settings: Settings, body: str, samples: Frame) -> Figure:
     for row, (name, flight) in zip(panels, settings.flights.items(), strict=True):
         row[0].set_ylabel(flight.title, fontsize=8)
         for axes, (what, said) in zip(row, QUANTITIES.items(), strict=True):
-            if what in REFERENCE_ERROR:
-                axes.axhspan(_FLOOR, REFERENCE_ERROR[what], color="#efefef", lw=0)
+            if what in ("position_m", "attitude_rad"):
+                axes.axhspan(_FLOOR, REFERENCE_ERROR, color="#efefef", lw=0)
                 _draw_agreement(axes)
             for pair, label, colour, width, alpha in lines:
                 one = samples[(samples.scene == name) & (samples.pair == pair)]
@@ -411,9 +406,5 @@ def draw_remedies(settings: Settings, body: str, rows: Frame) -> Figure:
 
 
 def chosen(what: str, name: str, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the name asked for, or every name for ``all``.
-
-    Raises:
-        ValueError: there is no such name; with the nearest.
-    """
+    """Return the name asked for, or every name for ``all``; a ValueError names the nearest."""
     return tuple(names) if name == "all" else (known(what, name, [*names, "all"]),)

@@ -42,8 +42,7 @@ def timed(work: Callable[[], object], clock: Callable[[], float] = time.perf_cou
 def cpu_seconds(work: Callable[[], object], repeats: int = REPEATS) -> list[float]:
     """Do ``work`` once to warm the caches and then ``repeats`` times; return CPU seconds.
 
-    They are this thread's own: of work in one thread, on a quiet machine, the wall time, and on a
-    busy one still the work's.
+    They are this thread's own: on a busy machine still the work's.
     """
     work()
     return [timed(work, time.thread_time) for _ in range(repeats)]
@@ -103,11 +102,12 @@ class Case(ABC):
         env_steps: environment steps in one of its steps, such as the number of environments.
         simulated_s: simulated time of one environment step.
         steps_done: its steps so far.
+        steps_a_round: its steps in one turn; 0 before `prepare`.
     """
 
     def __init__(self, name: str, env_steps: int, simulated_s: float) -> None:
         self.name, self.env_steps, self.simulated_s = name, env_steps, simulated_s
-        self.steps_done = 0
+        self.steps_done = self.steps_a_round = 0
 
     def run(self, steps: int) -> float:
         """Do ``steps`` steps and return the wall seconds that they took."""
@@ -118,13 +118,13 @@ class Case(ABC):
     def _run(self, steps: int) -> float:
         """Do ``steps`` steps; preparations that a user would not pay for are not counted."""
 
-    def prepare(self, config: Config) -> int:
-        """Warm up, and return the steps of one round."""
+    def prepare(self, config: Config) -> None:
+        """Warm up, and find out how many steps fill a round."""
         self.run(max(1, round(config.warm_up_s / self.simulated_s)))
         steps = 1
         while (taken := self.run(steps)) < config.round_s / 4:
             steps *= 2
-        return max(1, round(steps * config.round_s / taken))
+        self.steps_a_round = max(1, round(steps * config.round_s / taken))
 
     def verify(self) -> None:  # noqa: B027 - most have nothing to verify
         """Raise if what was timed was not what should have been."""
@@ -139,10 +139,11 @@ def compare(cases: Sequence[Case], config: Config) -> Frame:
     Returns:
         (rounds, cases) wall seconds of one environment step, by the cases' names.
     """
-    steps = {case.name: case.prepare(config) for case in cases}
+    for case in cases:
+        case.prepare(config)
 
     def turn(case: Case) -> float:
-        return case.run(steps[case.name]) / (steps[case.name] * case.env_steps)
+        return case.run(case.steps_a_round) / (case.steps_a_round * case.env_steps)
 
     seconds = interleaved({case.name: partial(turn, case) for case in cases}, config.rounds)
     for case in cases:

@@ -57,8 +57,8 @@ class Clockwork(Case):
         self._step_s, self._turns = step_s, turns
         super().__init__(name, env_steps, simulated_s=0.05)
 
-    def prepare(self, config: Config) -> int:
-        return 10
+    def prepare(self, config: Config) -> None:
+        self.steps_a_round = 10
 
     def _run(self, steps: int) -> float:
         self._turns.append(self.name)
@@ -96,7 +96,8 @@ def test_a_round_is_as_long_as_the_config_says() -> None:
             return steps * 1e-3
 
     sleeper = Sleeper("sleeper", 1, simulated_s=0.05)
-    assert sleeper.prepare(Config(rounds=1, round_s=0.25, warm_up_s=1.0)) == 250
+    sleeper.prepare(Config(rounds=1, round_s=0.25, warm_up_s=1.0))
+    assert sleeper.steps_a_round == 250
     # A second of the game is twenty of its steps, and the length of a round had to be found.
     assert sleeper.steps_done == 20 + (2**7 - 1)
 

@@ -46,12 +46,7 @@ STATE: Final = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 def check_options(options: Mapping[str, Any]) -> None:
-    """Raise what making an environment with these options would raise, before anything runs.
-
-    Raises:
-        ValueError: an option is unknown or its value is not allowed.
-        LevelError: the level is not valid.
-    """
+    """Raise what making an environment with these options would raise, before anything runs."""
     load_level(make_config(**options).level)
 
 
@@ -66,25 +61,14 @@ def random_actions(num_envs: int) -> Iterator[Int64]:
 
 
 class Game(Case):
-    """An environment of ours under random keys; what stands behind it does its physics again.
-
-    Attributes:
-        simulation: what it plays in.
-        options: those of `roller_env.config.EnvConfig`.
-        steps_a_round: of the interleaved run; 0 before `prepare`.
-    """
+    """An environment of ours under random keys; what stands behind it does its physics again."""
 
     def __init__(
         self, name: str, num_envs: int, simulation: Simulation, options: Mapping[str, Any]
     ) -> None:
-        self.simulation, self.options, self.steps_a_round = simulation, dict(options), 0
+        self.simulation, self.options = simulation, dict(options)
         self._actions = random_actions(num_envs)
         super().__init__(name, num_envs, simulation.duration_s)
-
-    def prepare(self, config: Config) -> int:
-        """Warm up, and return the steps of one round."""
-        self.steps_a_round = super().prepare(config)
-        return self.steps_a_round
 
     def _run(self, steps: int) -> float:
         actions = [next(self._actions) for _ in range(steps)]
@@ -99,7 +83,6 @@ class VectorStep(Game):
     """Whole steps of the vector environment: rules, observation, reward and autoreset."""
 
     def __init__(self, name: str, num_envs: int, num_threads: int, **options: Any) -> None:
-        """Begin the games; ``options`` are those of `roller_env.config.EnvConfig`."""
         options = {"num_threads": num_threads, **options}
         self._env = RollerVectorEnv(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **options)
         self._env.reset(seed=SEED)
@@ -115,7 +98,6 @@ class SingleStep(Game):
     """Steps of one environment as `gymnasium.make` makes it, wrappers and resets included."""
 
     def __init__(self, name: str, **options: Any) -> None:
-        """Begin the game; ``options`` are those of `roller_env.config.EnvConfig`."""
         options = {"num_threads": 1, **options}
         self._env: gym.Env[Any, Any] = gym.make("roller_env:Roller/Level-v0", **options)
         self._env.reset(seed=SEED)
@@ -135,10 +117,9 @@ class SingleStep(Game):
 
 
 class PhysicsAlone(Case):
-    """The physics of a game once more, step by step, to the bit, and nothing else."""
+    """The physics of a game, its leader, once more, step by step, to the bit, and nothing else."""
 
     def __init__(self, name: str, leader: Game) -> None:
-        """Do what ``leader`` does, behind it."""
         count = leader.env_steps
         self._leader, self._actions = leader, random_actions(count)
         self._env = RollerVectorEnv(count, autoreset_mode=AutoresetMode.DISABLED, **leader.options)
@@ -151,10 +132,10 @@ class PhysicsAlone(Case):
         self._control = slice(begin, begin + self.model.nu)
         super().__init__(name, count, leader.simulated_s)
 
-    def prepare(self, config: Config) -> int:
-        """Catch up with the leader, and return the steps of its rounds."""
+    def prepare(self, config: Config) -> None:
+        """Catch up with the leader, and take as many steps a round."""
         self.run(self._leader.steps_done)
-        return self._leader.steps_a_round
+        self.steps_a_round = self._leader.steps_a_round
 
     @property
     def _states(self) -> Float64:
@@ -195,11 +176,7 @@ class PhysicsAlone(Case):
         """Return the integration states, (N, nstate)."""
 
     def verify(self) -> None:
-        """Raise unless every ball is, to the bit, where the leader's is.
-
-        Raises:
-            RuntimeError: one is not, so that its time says nothing.
-        """
+        """Raise a RuntimeError unless every ball is, to the bit, where the leader's is."""
         theirs = self._leader.simulation.snapshot().physics
         wrong = np.flatnonzero((self._reached() != theirs).any(axis=1))
         if len(wrong):
@@ -213,7 +190,6 @@ class BatchAlone(PhysicsAlone):
     """`mujoco.batch.Batch`, of which only `Batch.step` is timed: neither controls nor resets."""
 
     def __init__(self, name: str, leader: VectorStep) -> None:
-        """Do what ``leader`` does, behind it."""
         super().__init__(name, leader)
         threads = leader.simulation.config.num_threads
         # As the game's stepper opens it.
@@ -238,7 +214,6 @@ class BareLoop(PhysicsAlone):
     """A Python loop of `mj_step`. Setting the controls is timed as well; resets are not."""
 
     def __init__(self, name: str, leader: SingleStep) -> None:
-        """Do what ``leader`` does, behind it."""
         super().__init__(name, leader)
         self._data = mujoco.MjData(self.model)
         self._put(np.zeros(1, np.int64), self._states)
@@ -276,7 +251,6 @@ class Training(Case):
     """
 
     def __init__(self, name: str, model: PPO, simulated_s: float) -> None:
-        """Run a learner, its environments inside."""
         self._model = model
         super().__init__(name, model.n_envs * model.n_steps, simulated_s)
 
@@ -285,10 +259,10 @@ class Training(Case):
         assert self._model.env is not None
         self._model.env.close()
 
-    def prepare(self, config: Config) -> int:
+    def prepare(self, config: Config) -> None:
         """Do one update unseen; a round is as many as fill it, but one at least."""
         self.run(1)
-        return max(1, round(config.round_s / self.run(1)))
+        self.steps_a_round = max(1, round(config.round_s / self.run(1)))
 
     def _run(self, steps: int) -> float:
         return timed(lambda: self._model.learn(steps * self.env_steps, reset_num_timesteps=False))

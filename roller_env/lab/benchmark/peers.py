@@ -21,22 +21,14 @@ class PeerError(RuntimeError):
 
 
 class Peer(Case):
-    """An environment of `peer_worker`, stepped over a pipe; the pipe's time is not counted.
+    """An environment of `peer_worker`, stepped over a pipe; the pipe's time is not counted."""
 
-    Attributes:
-        versions: of the packages that it is made of.
-    """
+    versions: dict[str, str]  # of the packages that it is made of
 
     def __init__(self, name: str, interpreter: Path, **wanted: Any) -> None:
-        """Start the worker.
+        """Start the worker in the peers' ``interpreter``, or raise a `PeerError`.
 
-        Args:
-            name: what tables call it.
-            interpreter: Python of an environment that has the peers.
-            wanted: ``peer`` is a key of `peer_worker.PEERS`; the others are its arguments.
-
-        Raises:
-            PeerError: the worker did not come up.
+        Of what is ``wanted`` ``peer`` is a key of `peer_worker.PEERS`; the others its arguments.
         """
         self._complaints = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 - close
         self._process = subprocess.Popen(
@@ -47,7 +39,7 @@ class Peer(Case):
             text=True,
         )
         facts = self._answer(name)
-        self.versions: dict[str, str] = facts["versions"]
+        self.versions = facts["versions"]
         super().__init__(name, facts["env_steps"], facts["simulated_s"])
 
     def close(self) -> None:

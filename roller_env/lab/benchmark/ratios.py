@@ -44,12 +44,8 @@ _ROLLER_PPO, _SUBPROC_PPO, _TRAIN, _FEW, _MANY = _OTHERS
 class Goal(NamedTuple):
     """A number that is to be reached.
 
-    Attributes:
-        title: what is compared, for a table.
-        sense: on which side of the bound it is to be.
-        bound: the goal.
-        of: the number, round by round, from wall seconds round by round by the case's name: those
-            of an environment step, and those of a simulated second.
+    It is taken round by round, from wall seconds by the case's name: those of an environment step,
+    and those of a simulated second.
     """
 
     title: str
@@ -133,35 +129,27 @@ class Task:
     def _peer(self, name: str, **wanted: Any) -> list[runner.Case]:
         return [] if self.peers is None else [Peer(name, self.peers, **wanted)]
 
-    def _trainings(self) -> list[runner.Case]:
-        count = self.training_envs
-        theirs = cases.with_subproc_vec_env(_SUBPROC_PPO, count, **self.options)
-        return [
-            theirs,
-            cases.with_roller_vec_env(_ROLLER_PPO, count, self.num_threads, **self.options),
-        ]
-
-    def _vectors(self) -> list[runner.Case]:
-        ours, sizes = self.vector(), {"num_envs": self.num_envs, "num_threads": self.num_threads}
-        return [
-            ours,
-            cases.BatchAlone(_BATCH, ours),
-            *self._peer(_ENVPOOL, peer="envpool", **sizes),
-        ]
-
-    def _singles(self) -> list[runner.Case]:
-        ours = self.single()
-        peer = self._peer(_ROBOTICS, peer="gymnasium-robotics")
-        return [ours, cases.BareLoop(_LOOP, ours), *peer]
-
     def runs(self) -> dict[str, Callable[[], list[runner.Case]]]:
         """Return what makes the cases of each interleaved run, by what is said of it."""
+        count, threads, options = self.training_envs, self.num_threads, self.options
+        sizes = {"num_envs": self.num_envs, "num_threads": threads}
         few, many = (_FEW, FEW_ENVS), (_MANY, MANY_ENVS)
         return {
             # First, while there are no threads that a fork could cut off.
-            "training: RollerVecEnv, SubprocVecEnv": self._trainings,
-            "vector steps": self._vectors,
-            "one environment": self._singles,
+            "training: RollerVecEnv, SubprocVecEnv": lambda: [
+                cases.with_subproc_vec_env(_SUBPROC_PPO, count, **options),
+                cases.with_roller_vec_env(_ROLLER_PPO, count, threads, **options),
+            ],
+            "vector steps": lambda: [
+                (ours := self.vector()),
+                cases.BatchAlone(_BATCH, ours),
+                *self._peer(_ENVPOOL, peer="envpool", **sizes),
+            ],
+            "one environment": lambda: [
+                (ours := self.single()),
+                cases.BareLoop(_LOOP, ours),
+                *self._peer(_ROBOTICS, peer="gymnasium-robotics"),
+            ],
             f"{FEW_ENVS} and {MANY_ENVS} environments": lambda: [
                 self.vector(*few),
                 self.vector(*many),
@@ -212,7 +200,8 @@ def profile(task: Task, say: Callable[[str], None]) -> Frame:
     for what, make in steps.items():
         say(f"where the time goes: {what}")
         case = make()
-        count = task.config.rounds * case.prepare(task.config)
+        case.prepare(task.config)
+        count = task.config.rounds * case.steps_a_round
         found.append(where_the_time_goes(what, partial(case.run, count), count * case.env_steps))
         case.close()
     return pd.concat(found, ignore_index=True)

@@ -72,11 +72,7 @@ geoms."""
 
 
 def level_of_boxes(boxes: int) -> Level:
-    """Return the yard with pillars, and further pillars beyond its walls, ``boxes`` in all.
-
-    Raises:
-        ValueError: fewer than `YARD_BOXES`.
-    """
+    """Return the yard with pillars, and more beyond its walls: ``boxes``, at least `YARD_BOXES`."""
     if boxes < YARD_BOXES:
         raise ValueError(f"boxes: found {boxes}; the yard alone has {YARD_BOXES}")
     # A row is left free where the wall stands.
@@ -86,14 +82,7 @@ def level_of_boxes(boxes: int) -> Level:
 
 
 def level_of_coins(coins: int) -> Level:
-    """Return the yard without pillars and a square of coins, a metre apart, round its middle.
-
-    Args:
-        coins: a square number, or 0.
-
-    Raises:
-        ValueError: no square number.
-    """
+    """Return the yard without pillars and a square of coins, a metre apart, round its middle."""
     side = math.isqrt(coins)
     if side * side != coins:
         raise ValueError(f"coins: found {coins}; must be a square number such as {side * side}")
@@ -134,19 +123,10 @@ def _yard(name: str, pillars: Sequence[dict[str, Any]] = (), **pieces: Any) -> L
 
 
 def watch(num_envs: int, env_steps: int, samples: int, **options: Any) -> Frame:
-    """Return the memory of a fresh process as it goes.
+    """Return ``environments``, ``env_steps`` and ``resident_gb`` of a fresh process as it goes.
 
-    Args:
-        num_envs: environments of its vector.
-        env_steps: environment steps in all.
-        samples: how often memory is read, evenly over the steps, the last time at the end.
-        options: of `roller_env.config.EnvConfig` that JSON can carry.
-
-    Returns:
-        ``environments``, ``env_steps`` and ``resident_gb``.
-
-    Raises:
-        RuntimeError: the process failed; its message is on standard error.
+    It is read in samples, evenly over all steps, the last time at the end. The options are of
+    `roller_env.config.EnvConfig`; a process that fails is a RuntimeError.
     """
     wanted = json.dumps([num_envs, env_steps, samples, options])
     command = [sys.executable, "-m", "roller_env.lab.benchmark.scale", wanted]

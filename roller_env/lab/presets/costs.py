@@ -154,15 +154,10 @@ _SIZES: Final[Mapping[str, Way]] = {
 def ablations(rounds: int, boxes: Sequence[int], games: int) -> Frame:
     """Measure every way to model the classic level, and levels of more and more boxes.
 
-    Args:
-        rounds: turns over which costs are medians.
-        boxes: sizes of the levels.
-        games: that are stepped together.
-
     Returns:
         ``what`` is modelled otherwise, ``chosen`` (as the compiler does it), ``boxes`` (0 for the
-        classic level), ``geoms``, ``us_per_step`` (CPU, median) with its ``spread``, and
-        ``same_bits``: whether the ball's way is the chosen model's, to the bit.
+        classic level), ``geoms``, ``us_per_step`` (CPU, median of the rounds) with its ``spread``,
+        and ``same_bits``: whether the ball's way is the chosen model's, to the bit.
     """
     levels = {count: level_of_boxes(count) for count in boxes}
     return Frame(

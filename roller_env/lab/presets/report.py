@@ -41,18 +41,13 @@ QUICK: Final = Effort(FEW, reference_hz=1920, rounds=2, boxes=(60, 200), games=4
 
 
 def measure(effort: Effort, watched: Callable[[Sequence[str]], Iterable[str]]) -> Frame:
-    """Measure all settings.
-
-    Args:
-        effort: how much.
-        watched: goes over names while showing progress.
+    """Measure all settings; ``watched`` goes over names while showing progress.
 
     Returns:
         A row a setting, the cheapest first: the errors of `roller_env.lab.presets.errors`;
         ``setting``, ``knob``, ``dt_s``; ``us_per_step`` (CPU, on the classic level) and
-        ``cpu_s_per_s`` (of a simulated second of one game) with their ``spread``; ``violations``,
-        the requirements that it does not meet; ``front``: whether it meets all, and none that does
-        is both cheaper and truer on the course.
+        ``cpu_s_per_s`` (of a simulated second of one game) with their ``spread``; ``violations``;
+        ``front``: whether it has none, and nothing without is both cheaper and truer on the course.
     """
     settings, level = {name: SETTINGS[name] for name in effort.settings}, load_level("classic")
     with without_warnings():
