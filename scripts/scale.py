@@ -83,13 +83,12 @@ def main(arguments: Arguments) -> None:
     _say(f"long run of {task.leak_steps:,} environment steps")
     leak = scale.measure_leak(task)
     goals = table.Frame([boxes_goal, memory_goal, scale.judge_leak(leak)])
-    facts, out = provenance(("mujoco", "numpy")), arguments.out
-    for name, rows in (("cost", costs), ("memory", memory), ("long_run", leak), ("goals", goals)):
-        table.write(rows, facts, out / name)
-    chart.save(scale.draw(costs, memory, leak), facts, out / "scale")
+    facts = provenance(("mujoco", "numpy"))
     text = f"{header(facts)}\n\n{scale.report(goals, costs, memory)}"
-    (out / "scale.md").write_text(text, encoding="utf-8")
-    print(f"\n{text}\nTables and pictures: {out}")
+    tables = {"cost": costs, "memory": memory, "long_run": leak, "goals": goals}
+    figures = {"scale": scale.draw(costs, memory, leak)}
+    chart.write(arguments.out, facts, tables, figures, ("scale", text))
+    print(f"\n{text}\nTables and pictures: {arguments.out}")
 
 
 def _say(what: str) -> None:

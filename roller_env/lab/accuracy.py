@@ -18,7 +18,7 @@ from typing import Any, Final, get_args
 
 import pandas as pd
 
-from roller_env.lab import chart, table
+from roller_env.lab import chart
 from roller_env.lab.chart import duration
 from roller_env.lab.contact import CONTACT_SCENES
 from roller_env.lab.contact.scene import ContactScene
@@ -241,14 +241,7 @@ def write(results: Results, out: Path) -> list[Path]:
             some = [plot for name, plot in plots.items() if (name in free) == (where == "free")]
             if len(some) > 1:
                 figures[f"overview-{where}-{kind}"] = chart.draw_overview(some)
-    files: list[Path] = []
-    for name, rows in tables.items():
-        files += table.write(rows, facts, out / name) if len(rows) else ()
-    for name, figure in figures.items():
-        files += chart.save(figure, facts, out / name)
-    text = out / "accuracy.md"
-    text.write_text(page(results, facts), encoding="utf-8")
-    return [*files, text]
+    return chart.write(out, facts, tables, figures, ("accuracy", page(results, facts)))
 
 
 # --- the page --------------------------------------------------------------------------------

@@ -23,6 +23,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 from pandas import concat
 
+from roller_env.lab import table
 from roller_env.lab.runner import header
 from roller_env.lab.scene import ROUNDING, ErrorKind, failures, pareto, sound
 from roller_env.lab.table import Frame
@@ -86,6 +87,26 @@ def save(figure: Figure, facts: Mapping[str, str], stem: Path) -> tuple[Path, Pa
     figure.savefig(png, dpi=150, facecolor="white")
     figure.savefig(svg, facecolor="white", metadata={"Date": None})
     return png, svg
+
+
+def write(
+    out: Path,
+    facts: Mapping[str, str],
+    tables: Mapping[str, Frame],
+    figures: Mapping[str, Figure],
+    page: tuple[str, str] = ("", ""),
+) -> list[Path]:
+    """Write an experiment's tables, figures and Markdown page, by their names; return the files."""
+    files: list[Path] = []
+    for name, rows in tables.items():
+        files += table.write(rows, facts, out / name) if len(rows) else ()
+    for name, figure in figures.items():
+        files += save(figure, facts, out / name)
+    name, text = page
+    if text:
+        files.append(out / f"{name}.md")
+        files[-1].write_text(text, encoding="utf-8")
+    return files
 
 
 @styled

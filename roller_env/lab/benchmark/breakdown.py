@@ -7,7 +7,7 @@ no Python frame shows) counts for the one that called it.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -32,37 +32,25 @@ _ROLLER, _MUJOCO, _GYMNASIUM, _SB3 = (
     for package in (roller_env, mujoco, gymnasium, stable_baselines3)
 )
 
-_PARTS: Final = (
-    (f"{_MUJOCO}/", "", "physics: MuJoCo"),
-    (f"{_ROLLER}/physics/", "", "physics: around it"),
-    (f"{_ROLLER}/game/observations.py", "", "observation"),
-    (f"{_ROLLER}/game/rewards.py", "", "reward"),
-    (f"{_ROLLER}/game/", "", "rules"),
-    (f"{_ROLLER}/simulation.py", "", "Python: simulation and faces"),
-    (f"{_ROLLER}/envs/", "", "Python: simulation and faces"),
-    (f"{_GYMNASIUM}/wrappers/", "", "Python: Gymnasium's wrappers"),
-    (f"{_ROLLER}/training/", "", "training: practice, records"),
-    (f"{_SB3}/common/vec_env/vec_normalize.py", "", "training: normalisation"),
-    (f"{_SB3}/common/on_policy_algorithm.py", "collect_rollouts", "training: policy, buffer"),
-    (f"{_SB3}/ppo/ppo.py", "train", "training: update"),
-)
-"""Beginning of a file's path, function (any, if empty), part; the first that fits counts."""
-
-_COLOURS: Final = {
-    "physics: MuJoCo": "#1f4e8c",
-    "physics: around it": "#7fb2e5",
-    "observation": "#1b998b",
-    "reward": "#9bd3a8",
-    "rules": "#3a8f5c",
-    "Python: simulation and faces": "#b58900",
-    "Python: Gymnasium's wrappers": "#e3c567",
-    "training: practice, records": "#f0a58f",
-    "training: normalisation": "#d1495b",
-    "training: policy, buffer": "#c77dba",
-    "training: update": "#7a5bb5",
-    OTHER: "#9a9a9a",
+_PARTS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
+    "physics: MuJoCo": ("#1f4e8c", (f"{_MUJOCO}/",)),
+    "physics: around it": ("#7fb2e5", (f"{_ROLLER}/physics/",)),
+    "observation": ("#1b998b", (f"{_ROLLER}/game/observations.py",)),
+    "reward": ("#9bd3a8", (f"{_ROLLER}/game/rewards.py",)),
+    "rules": ("#3a8f5c", (f"{_ROLLER}/game/",)),
+    "Python: simulation and faces": ("#b58900", (f"{_ROLLER}/simulation.py", f"{_ROLLER}/envs/")),
+    "Python: Gymnasium's wrappers": ("#e3c567", (f"{_GYMNASIUM}/wrappers/",)),
+    "training: practice, records": ("#f0a58f", (f"{_ROLLER}/training/",)),
+    "training: normalisation": ("#d1495b", (f"{_SB3}/common/vec_env/vec_normalize.py",)),
+    "training: policy, buffer": (
+        "#c77dba",
+        (f"{_SB3}/common/on_policy_algorithm.py collect_rollouts",),
+    ),
+    "training: update": ("#7a5bb5", (f"{_SB3}/ppo/ppo.py train",)),
+    OTHER: ("#9a9a9a", ()),
 }
-"""Of every part, from the physics outwards."""
+"""Colour of every part, and with what its functions begin: the path of the file and, after a space,
+the name; the first part that fits counts."""
 
 
 def where_the_time_goes(what: str, work: Callable[[], object], env_steps: int) -> Frame:
@@ -91,10 +79,8 @@ def where_the_time_goes(what: str, work: Callable[[], object], env_steps: int) -
 
 def _count(sampled: Sampled, part: str, seconds: dict[str, float]) -> None:
     """Add the time of a function, and of those that it called, to the parts they belong to."""
-    path, function = sampled.file_path or "", sampled.function
-    for begin, wanted, belonging in reversed(_PARTS):
-        if path.startswith(begin) and wanted in ("", function):
-            part = belonging
+    name = f"{sampled.file_path or ''} {sampled.function}"
+    part = next((p for p, (_, begins) in _PARTS.items() if name.startswith(begins)), part)
     own = sampled.time - sum(child.time for child in sampled.children)
     if own > 0.0:
         seconds[part] = seconds.get(part, 0.0) + own
@@ -106,10 +92,17 @@ def _count(sampled: Sampled, part: str, seconds: dict[str, float]) -> None:
 def draw(rows: Frame) -> Figure:
     """Draw where the time of every profiled step goes, one bar each."""
     shares = rows.pivot_table("share", "what", "part", sort=False)
-    shares = shares.reindex(columns=[part for part in _COLOURS if part in shares])
+    shares = shares.reindex(columns=[part for part in _PARTS if part in shares])
     shape, margins = (8.6, 0.7 * len(shares)), (2.2, 0.4, 0.9, 1.6)
     figure, ((axes,),) = chart.grid((1, 1), "Where the time goes", "", panel=shape, margins=margins)
-    shares.plot.barh(stacked=True, ax=axes, width=0.55, color=_COLOURS, legend=False, zorder=2)
+    shares.plot.barh(
+        stacked=True,
+        ax=axes,
+        width=0.55,
+        color={part: _PARTS[part][0] for part in shares},
+        legend=False,
+        zorder=2,
+    )
     for bars in axes.containers:
         shown = [f"{100 * v:.0f} %" if v > 0.035 else "" for v in bars.datavalues]
         axes.bar_label(bars, shown, label_type="center", fontsize=9)

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from roller_env.lab import chart, table
+from roller_env.lab import chart
 from roller_env.lab.methods import without_warnings
 from roller_env.lab.presets.costs import AS_CHOSEN, Games, costs
 from roller_env.lab.presets.errors import REFERENCE_HZ, REQUIREMENTS, errors_of, violations
@@ -112,14 +112,14 @@ _PUBLISHED: Final[Mapping[str, str]] = {
 
 def write(settings: Frame, ablations: Frame, facts: dict[str, str], out: Path) -> list[Path]:
     """Write everything; return the files."""
-    files = [*table.write(settings, facts, out / "settings")]
-    files += table.write(ablations, facts, out / "ablations")
-    files += chart.save(draw_front(settings), facts, out / "front")
-    files += chart.save(draw_requirements(settings), facts, out / "requirements")
-    files += chart.save(draw_ablations(ablations), facts, out / "ablations")
-    page = out / "presets.md"
-    page.write_text(f"{header(facts)}\n\n{tables(settings, ablations)}", encoding="utf-8")
-    return [*files, page]
+    figures = {
+        "front": draw_front(settings),
+        "requirements": draw_requirements(settings),
+        "ablations": draw_ablations(ablations),
+    }
+    page = f"{header(facts)}\n\n{tables(settings, ablations)}"
+    rows = {"settings": settings, "ablations": ablations}
+    return chart.write(out, facts, rows, figures, ("presets", page))
 
 
 def publish(out: Path, docs: Path) -> list[Path]:
