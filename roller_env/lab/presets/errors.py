@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
 
-from roller_env.compile.compiled import CompiledLevel
 from roller_env.config import EnvConfig
 from roller_env.game.actions import forces, held_keys
 from roller_env.lab import game
@@ -26,37 +25,30 @@ Float64 = npt.NDArray[np.float64]
 Errors = dict[str, float]
 """What one setting gets wrong, by names such as those of `REQUIREMENTS`."""
 
-LANE_M: Final = 80.0
 LOST_M: Final = 1e4
-ROLLING: Final = 1.4
-"""Inertia of a solid ball that rolls, over its mass."""
+ARRIVALS: Final = np.linspace(0.02, 0.98, 12)
+"""Shares of a step after which a ball touches the ground."""
 
 
 class World:
-    """Some balls on one level, and no rules.
+    """Some balls on one level, and no rules."""
 
-    Attributes:
-        compiled: the level.
-        position: (balls, 3) live view, m.
-        velocity: (balls, 3) live view, m/s.
-        spin: (balls, 3) live view, rad/s.
-        ctrl: (balls, nu) live view.
-        went: (balls, S, nq) every position after the steps of the last `advance`.
-    """
+    position: Float64  # (balls, 3) live view, m
+    velocity: Float64  # (balls, 3) live view, m/s
+    spin: Float64  # (balls, 3) live view, rad/s
+    ctrl: Float64  # (balls, nu) live view
+    went: Float64  # (balls, S, nq) after every step of the last `advance`
 
     def __init__(self, setting: Setting, level: Level, position: npt.ArrayLike):
         """Compile the level, with balls at rest at ``position``, (balls, 3) m."""
-        self.compiled: CompiledLevel = setting.compile(level)
-        self.dt_s = setting.preset.dt_s
+        self.compiled, self.dt_s = setting.compile(level), setting.preset.dt_s
         model, position = self.compiled.model, np.asarray(position)
         self._batch = Batch(model, len(position), 1, persistent=keeps_poses(model))
-        self.ctrl: Float64 = self._batch.bind("ctrl")
-        qpos, qvel = self._batch.bind("qpos"), self._batch.bind("qvel")
+        self.ctrl, qpos, qvel = (self._batch.bind(name) for name in ("ctrl", "qpos", "qvel"))
         start, velocity = self.compiled.ball_qpos, self.compiled.ball_qvel
         self._place, self._speed = slice(start, start + 3), slice(velocity, velocity + 3)
-        self.position: Float64 = qpos[:, self._place]
-        self.velocity: Float64 = qvel[:, self._speed]
-        self.spin: Float64 = qvel[:, velocity + 3 : velocity + 6]
+        self.position, self.velocity = qpos[:, self._place], qvel[:, self._speed]
+        self.spin = qvel[:, velocity + 3 : velocity + 6]
         self.position[:] = position
 
     def roll(self, speed: Float64) -> None:
@@ -68,15 +60,13 @@ class World:
         self.ctrl[:, self.compiled.force_ctrl[: newtons.shape[1]]] = newtons
 
     def advance(self, seconds: float, times: int = 1) -> tuple[Float64, Float64]:
-        """Go on for a number of times so many seconds, each a whole number of steps.
+        """Go on for some times so many seconds; return places, m, and velocities, m/s.
 
-        Returns:
-            Places, m, and velocities, m/s, from the start on, both (balls, S + 1, 3); NaN where a
-            ball has left the world.
+        Both (balls, S + 1, 3), from the start on; NaN where a ball has left the world.
         """
         before = self.position[:, None].copy(), self.velocity[:, None].copy()
         went = self._batch.rollout(times * round(seconds / self.dt_s), record=("qpos", "qvel"))
-        self.went: Float64 = went["qpos"]
+        self.went = went["qpos"]
         after = went["qpos"][:, :, self._place], went["qvel"][:, :, self._speed]
         place, velocity = (np.concatenate(pair, 1) for pair in zip(before, after, strict=True))
         lost = ~(np.abs(place) < LOST_M).all(axis=2)
@@ -99,8 +89,6 @@ def _over_ground(height: npt.ArrayLike) -> Float64:
     return np.multiply.outer(RADIUS_M + np.asarray(height), (0.0, 0.0, 1.0))
 
 
-# Driving -------------------------------------------------------------------------------------
-
 SEQUENCES: Final = (
     ("w", "w", "w", "w", "w", "w", "w", "w", "w", "w"),
     ("w", "w", "w", "wa", "wa", "a", "d", "d", "sd", "sd"),
@@ -110,7 +98,6 @@ SEQUENCES: Final = (
 )
 """Keys of ``wasd`` held for half a second each: straight on, there and back, round, in pauses; and
 in all eight directions."""
-
 HELD_S: Final = 0.5
 
 
@@ -126,7 +113,7 @@ def driving(setting: Setting) -> Errors:
         newtons = np.array([forces("keys", held_keys(keys)[None])[0] for keys in held])
         world.force(newtons)
         path = world.advance(HELD_S)[0][:, :, :2]
-        push = newtons / ROLLING
+        push = newtons / 1.4  # inertia of a solid ball that rolls, over its mass
         exact = exact + speed * HELD_S + 0.5 * push * HELD_S**2
         speed = speed + push * HELD_S
         way += np.linalg.norm(np.diff(path, axis=1), axis=2).sum(axis=1)
@@ -139,13 +126,8 @@ def driving(setting: Setting) -> Errors:
     }
 
 
-# Landing -------------------------------------------------------------------------------------
-
-FALL_S: Final = 4.0
 FASTEST_M_S: Final = 36.0
 """Of a ball that enters classic's tube as fast as it can, climbs its wall and flies 66 m up."""
-ARRIVALS: Final = np.linspace(0.02, 0.98, 12)
-"""Shares of a step after which a ball touches the ground."""
 TUNNEL_SPEEDS_M_S: Final = np.arange(10.0, 121.0, 5.0)
 
 
@@ -159,7 +141,7 @@ def landing(setting: Setting) -> Errors:
     level = game.make_level(boxes=[deck], start={"at": (0.0, 0.0, RADIUS_M)})
     # 0.5 m of height are one step of 1/60 s at 30 m/s.
     falling = World(setting, level, _over_ground(game.TUBE_FALL_M + 0.5 * ARRIVALS))
-    fallen = _depth(falling.advance(FALL_S)[0])
+    fallen = _depth(falling.advance(4.0)[0])
     speed, arrival = _each([FASTEST_M_S, *TUNNEL_SPEEDS_M_S], ARRIVALS)
     thrown = World(setting, level, _over_ground(speed * setting.preset.dt_s * arrival))
     thrown.velocity[:, 2] = -speed
@@ -178,29 +160,18 @@ def _depth(path: Float64) -> Float64:
     return depth
 
 
-# Elasticity and friction ---------------------------------------------------------------------
-
-ELASTICITIES: Final = (0.0, 0.2, 0.5, 0.8, 0.95)
-SPEEDS_M_S: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
-WEIGHTLESS_M_S2: Final = 0.001
-
-
 def elasticity(setting: Setting) -> Errors:
     """Bounce balls of every elasticity at every speed, without gravity, which takes its part."""
     errors = []
-    speed, arrival = _each(SPEEDS_M_S, ARRIVALS[::2])
-    for one in ELASTICITIES:
-        level = game.make_level(ball={"elasticity": one}, gravity=WEIGHTLESS_M_S2)
+    speed, arrival = _each([0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0], ARRIVALS[::2])
+    for one in (0.0, 0.2, 0.5, 0.8, 0.95):
+        level = game.make_level(ball={"elasticity": one}, gravity=0.001)
         world = World(setting, level, _over_ground(speed * setting.preset.dt_s * arrival))
         world.velocity[:, 2] = -speed
         height = world.advance(0.6)[0][:, :, 2]
         returned = np.diff(height, axis=1).max(axis=1) / setting.preset.dt_s / speed
         errors.append(np.abs(returned - one))
     return {"elasticity": _worst(np.array(errors))}
-
-
-SKID_SPEEDS_M_S: Final = (2.0, 4.0, 8.0)
-SKID_HEADINGS_DEG: Final = (0.0, 22.5, 45.0)
 
 
 def friction(setting: Setting) -> Errors:
@@ -211,7 +182,7 @@ def friction(setting: Setting) -> Errors:
     errors of friction, of the last speed and of the heading; how high a ball of 4 m/s hops; and how
     deep one lies half a second after it was put there.
     """
-    speed, degrees = _each(SKID_SPEEDS_M_S, SKID_HEADINGS_DEG)
+    speed, degrees = _each([2.0, 4.0, 8.0], [0.0, 22.5, 45.0])
     angle = np.radians(degrees)
     way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     world = World(setting, game.make_level(), _over_ground(np.zeros(len(speed))))
@@ -236,9 +207,6 @@ def friction(setting: Setting) -> Errors:
     }
 
 
-# The lift, the seams, the movers -------------------------------------------------------------
-
-
 def lift(setting: Setting) -> Errors:
     """Throw the ball up as a lift pad does, and compare the rise with the closed form."""
     world = World(setting, game.make_level(), _over_ground([0.0]))
@@ -252,25 +220,19 @@ def lift(setting: Setting) -> Errors:
     return {"lift": abs(float(apex) / exact - 1.0)}
 
 
-SEAM_SPEEDS_M_S: Final = (3.0, 6.0, 9.0, 12.0, 15.0)
-
-
 def seams(setting: Setting) -> Errors:
     """Roll from classic's bridge over two seams onto the island, at 3 to 15 m/s: highest bump."""
     level = load_level("classic")
-    speed, share = _each(SEAM_SPEEDS_M_S, ARRIVALS[::3])
+    speed, share = _each([3.0, 6.0, 9.0, 12.0, 15.0], ARRIVALS[::3])
     begin = quants(660.0) + speed * setting.preset.dt_s * share
     flat = np.zeros_like(speed)
     world = World(setting, level, np.stack([begin, flat, flat + level.start.at[2]], axis=1))
     world.roll(speed)
-    path, _ = world.advance(quants(440.0) / max(SEAM_SPEEDS_M_S), times=5)
+    path, _ = world.advance(quants(440.0) / 15.0, times=5)
     on_course = path[:, :, 0] < quants(1180.0)
     settled = np.arange(path.shape[1]) * setting.preset.dt_s * speed[:, None] > 0.5
     height = np.where(on_course & settled, path[:, :, 2], -np.inf)
     return {"seam_mm": 1e3 * max(0.0, _worst(height.max(axis=1) - level.start.at[2]))}
-
-
-MOVED_S: Final = 0.3
 
 
 def movers(setting: Setting) -> Errors:
@@ -279,33 +241,30 @@ def movers(setting: Setting) -> Errors:
     The largest relative error of the speed, how much it goes up and down once it is reached, and
     how deep the ball is in what sinks under it.
     """
-    level, found = load_level("gate"), []
+    level, found, moved_s = load_level("gate"), [], 0.3
     for piece, servo in ((level.plates[0], "plate"), (level.gates[0], "gate")):
         top = piece.at[2] + piece.size[2] / 2 + RADIUS_M
         world = World(setting, level, [(piece.at[0], piece.at[1], top)])
         (at,), (ctrl,) = (getattr(world.compiled, f"{servo}_{of}") for of in ("qpos", "ctrl"))
         world.ctrl[:, ctrl] = -piece.speed
-        world.advance(MOVED_S)
+        world.advance(moved_s)
         before = float(world.went[0, -1, at])
-        path, _ = world.advance(MOVED_S)
+        path, _ = world.advance(moved_s)
         moved = world.went[0, :, at]
-        wrong = abs((before - float(moved[-1])) / (MOVED_S * piece.speed) - 1.0)
+        wrong = abs((before - float(moved[-1])) / (moved_s * piece.speed) - 1.0)
         ringing = float(np.ptp(np.diff(moved) / setting.preset.dt_s / piece.speed))
         found.append((wrong, ringing, 1e3 * (top + float(moved[-1]) - float(path[0, -1, 2]))))
     worst = np.max([(0.0, 0.0, 0.0), *found], axis=0).tolist()
     return dict(zip(("movers", "ringing", "carried_mm"), worst, strict=True))
 
 
-SQUEEZE_S: Final = 2.5
-SQUEEZED_AT_M: Final = (0.0, 0.15, 0.3, 0.45)
-"""From the middle of the gate."""
-
-
 def squeeze(setting: Setting) -> Errors:
     """Let a hanging gate come down on the ball, which has nowhere to go: the deepest contact."""
     compiled, down = setting.compile(hanging_gate_level(0.0)), -game.GATE_SPEED_M_S
-    courses = [game.Course(compiled, (x, 0.0, RADIUS_M), movers_m_s=down) for x in SQUEEZED_AT_M]
-    return {"squeeze_mm": 1e3 * max(float(game.play(c, SQUEEZE_S).depth.max()) for c in courses)}
+    # So far from the middle of the gate.
+    places = [(x, 0.0, RADIUS_M) for x in (0.0, 0.15, 0.3, 0.45)]
+    runs = [game.play(game.Course(compiled, at, movers_m_s=down), 2.5) for at in places]
+    return {"squeeze_mm": 1e3 * max(float(run.depth.max()) for run in runs)}
 
 
 LANE_SPEEDS_M_S: Final = np.linspace(7.5, 15.0, 76)
@@ -322,12 +281,10 @@ def lane(setting: Setting) -> Errors:
     world = World(setting, seam_level(seams=True), _over_ground(np.zeros(len(LANE_SPEEDS_M_S))))
     world.roll(LANE_SPEEDS_M_S)
     path, _ = world.advance(0.5, times=10)
-    bumps = np.where(path[:, :, 0] < LANE_M, path[:, :, 2] - RADIUS_M, 0.0).max(axis=1)
+    bumps = np.where(path[:, :, 0] < 80.0, path[:, :, 2] - RADIUS_M, 0.0).max(axis=1)
     thrown = ~(bumps <= quants(1.0))
     return {"lane_mm": 1e3 * _worst(bumps), "lane_share": float(thrown.mean())}
 
-
-# The course ----------------------------------------------------------------------------------
 
 CONTROL_DT_S: Final = 0.05
 COURSES: Final = (
@@ -383,8 +340,6 @@ def _converged_paths(steps_per_s: int) -> Float64:
     preset = PhysicsPreset("converged", 1 / steps_per_s, "RK4", iterations=100, tolerance=1e-14)
     return course_paths(Setting("converged", "reference", preset))
 
-
-# What the game can bear ----------------------------------------------------------------------
 
 _MEASURES: Final = (
     *(driving, landing, elasticity, friction),
