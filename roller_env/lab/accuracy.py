@@ -276,19 +276,18 @@ def orders_section(results: Results) -> str:
     wrong, odd = orders[~orders.agrees], orders[orders.reason != ""]
     wide = orders.pivot_table("shown", "method", ERROR, "first", sort=False).fillna("-")
     columns = {title: wide[key] for title, key in _SUITED.items() if key in wide}
-    theory = orders.groupby("method", sort=False).theory.first()
+    theory = orders.groupby("method", sort=False).theory.first().map("{:g}".format)
     parts = [
         f"The power of dt with which an error falls, measured over the last three halvings above "
         f"rounding, in motions of {HORIZON_S:g} s. Of {len(orders)} slopes "
         f"{len(orders) - len(wrong)} are within 0.15 of what theory expects.\n"
     ]
     if columns:
-        rows = [[m, f"{theory[m]:g}", *(of[m] for of in columns.values())] for m in wide.index]
-        parts.append(markdown(["method", "theory", *columns], rows))
+        parts.append(markdown(Frame({"theory": theory} | columns).reset_index()))
     if len(wrong):
-        rows = wrong[[*CURVE, "theory", "shown"]].to_numpy(object).tolist()
-        titles = ["scene", "error", "method", "theory", "measured"]
-        parts.append("Not as theory expects:\n\n" + markdown(titles, rows))
+        titles = {"measure": "error", "shown": "measured"}
+        unlike = wrong[[*CURVE, "theory", "shown"]].rename(columns=titles)
+        parts.append("Not as theory expects:\n\n" + markdown(unlike))
     parts.append("Where theory does not expect the method's own order, and why:\n")
     reasons = ""
     for reason, own in odd.groupby("reason"):
@@ -343,8 +342,8 @@ def accurate_section(results: Results) -> str:
         own = steps[steps.method.str.startswith(family)]
         if len(own):
             wide = own.pivot_table("shown", "scene", "method", "first", sort=False).fillna("")
-            titles = ["scene", *wide.columns.str.removeprefix(family)]
-            text += "\n" + markdown(titles, wide.reset_index().to_numpy().tolist())
+            wide.columns = wide.columns.str.removeprefix(family)
+            text += "\n" + markdown(wide.reset_index())
     return text
 
 
@@ -361,9 +360,7 @@ def costs_section(results: Results) -> str:
     costs = results.costs.pivot_table("us_per_body_step", "method", "bodies", sort=False)
     steps = costs.loc["MuJoCo RK4", 1] / costs.min(axis=1)
     wide = costs.astype(object).where(costs.notna(), "")
-    wide["evaluation"] = results.costs.groupby("method").us_per_body_evaluation.min()
-    wide["steps"] = steps.map("{:.2g}".format)
-    titles = ["method", *(f"µs a step, {n:,} at a time" for n in BATCHES)]
-    titles += ["least µs an evaluation", "steps while MuJoCo RK4 does one"]
-    rows = wide.reset_index().to_numpy(object).tolist()
-    return "Per body, on the thrown box, one thread.\n\n" + markdown(titles, rows)
+    wide.columns = [f"µs a step, {n:,} at a time" for n in BATCHES]
+    wide["least µs an evaluation"] = results.costs.groupby("method").us_per_body_evaluation.min()
+    wide["steps while MuJoCo RK4 does one"] = steps.map("{:.2g}".format)
+    return "Per body, on the thrown box, one thread.\n\n" + markdown(wide.reset_index())

@@ -323,16 +323,15 @@ def _angle(a: State, b: State) -> float:
 def verdict_table(verdicts: Frame) -> str:
     """Return the largest differences and who is wrong, for people, as Markdown."""
     columns = ["body", "scene", *QUANTITIES, "verdict"]
-    titles = ["body", "scene", *QUANTITIES.values(), "verdict"]
-    return markdown(titles, verdicts[columns].to_numpy().tolist())
+    return markdown(verdicts[columns].rename(columns=QUANTITIES))
 
 
 def remedy_table(rows: Frame) -> str:
     """Return the largest attitude differences from MuJoCo, rad, by method and step, as Markdown."""
-    wide = rows.pivot_table("against_mujoco_rad", ["method", "dt_s"], "scene", sort=False)
-    wide = wide.sort_index(level="dt_s", ascending=False, sort_remaining=False)
-    cells = [[name, 1e3 * dt, *apart] for (name, dt), apart in wide.T.to_dict("list").items()]
-    return markdown(["ours", "dt, ms", *(f"{scene}, rad" for scene in wide.columns)], cells)
+    rows = rows.assign(ours=rows.method, ms=1e3 * rows.dt_s, scene=rows.scene + ", rad")
+    wide = rows.pivot_table("against_mujoco_rad", ["ours", "ms"], "scene", sort=False)
+    wide = wide.sort_index(level="ms", ascending=False, sort_remaining=False)
+    return markdown(wide.reset_index().rename(columns={"ms": "dt, ms"}))
 
 
 # --- pictures --------------------------------------------------------------------------------

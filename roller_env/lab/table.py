@@ -37,12 +37,14 @@ def write(table: Frame, facts: Mapping[str, str], stem: Path) -> tuple[Path, Pat
     return csv_file, json_file
 
 
-def markdown(titles: Sequence[str], cells: Sequence[Sequence[object]]) -> str:
-    """Return a Markdown table; numbers are aligned right and given three significant digits."""
+def markdown(table: Frame | Sequence[str], cells: Sequence[Sequence[object]] | None = None) -> str:
+    """Return a frame, or titles and cells, as Markdown; numbers to the right, with three digits."""
+    titles = list(table)
+    rows = table.astype(object).to_numpy().tolist() if isinstance(table, Frame) else cells or []
     rules = [
-        "---:" if cells and all(isinstance(value, int | float) for value in column) else "---"
-        for column in (zip(*cells, strict=True) if cells else [()] * len(titles))
+        "---:" if rows and all(isinstance(row[at], int | float) for row in rows) else "---"
+        for at in range(len(titles))
     ]
-    shown = [[f"{v:.3g}" if isinstance(v, float) else str(v) for v in row] for row in cells]
+    shown = [[f"{v:.3g}" if isinstance(v, float) else str(v) for v in row] for row in rows]
     head = f"| {' | '.join(titles)} |\n|{'|'.join(rules)}|\n"
     return head + "".join(f"| {' | '.join(row)} |\n" for row in shown)

@@ -228,27 +228,29 @@ def draw_goals(goals: Frame, title: str) -> Figure:
 
 def goals_table(goals: Frame) -> str:
     """Return how the goals stand, as Markdown."""
-    cells = []
-    for row in goals.itertuples():
-        said = [f"{row.measured:.3g}", f"{row.smallest:.3g} to {row.largest:.3g}"]
-        measured = said if row.rounds else ["", ""]
-        cells.append([row.comparison, f"{row.sense} {row.goal:g}", *measured, row.verdict])
-    return markdown(("", "goal", "measured", "range", "verdict"), cells)
+    ranges = goals.smallest.map("{:.3g} to ".format) + goals.largest.map("{:.3g}".format)
+    shown = {
+        "": goals.comparison,
+        "goal": goals.sense + goals.goal.map(" {:g}".format),
+        "measured": goals.measured.map("{:.3g}".format).where(goals.rounds > 0, ""),
+        "range": ranges.where(goals.rounds > 0, ""),
+        "verdict": goals.verdict,
+    }
+    return markdown(Frame(shown))
 
 
 def report(goals: Frame, speeds: Frame, parts: Frame) -> str:
     """Return the goals, the cases and where the time goes, a table each."""
-    cells = [
-        (row.case, f"{row.env_steps_per_s:,.0f}", f"{row.spread:.0%}", row.simulated_s_per_s)
-        for row in speeds.itertuples()
-    ]
-    shares = [
-        (row.what, row.part, f"{row.share:.1%}", row.us_per_env_step) for row in parts.itertuples()
-    ]
-    return "\n".join(
-        (
-            goals_table(goals),
-            markdown(("case", "env steps/s", "spread", "simulated s/s"), cells),
-            markdown(("step", "part", "share", "µs an env step"), shares),
-        )
-    )
+    of_cases = {
+        "case": speeds.case,
+        "env steps/s": speeds.env_steps_per_s.map("{:,.0f}".format),
+        "spread": speeds.spread.map("{:.0%}".format),
+        "simulated s/s": speeds.simulated_s_per_s,
+    }
+    of_parts = {
+        "step": parts.what,
+        "part": parts.part,
+        "share": parts.share.map("{:.1%}".format),
+        "µs an env step": parts.us_per_env_step,
+    }
+    return "\n".join((goals_table(goals), markdown(Frame(of_cases)), markdown(Frame(of_parts))))

@@ -251,21 +251,19 @@ def judge_leak(rows: Frame) -> dict[str, Any]:
 
 def report(goals: Frame, costs: Frame, memory: Frame) -> str:
     """Return the goals, the cost on every axis and the memory, a table each."""
-    places = [
-        (
-            row.axis,
-            f"{row.value:,}",
-            row.us_per_env_step,
-            f"{row.smallest:.3g} to {row.largest:.3g}",
-            f"{1e6 / row.us_per_env_step:,.0f}",
-        )
-        for row in costs.itertuples()
-    ]
-    processes = [(f"{row.environments:,}", f"{row.resident_gb:.3f}") for row in memory.itertuples()]
-    cost = markdown(("axis", "size", "µs an env step", "range", "env steps/s"), places)
-    return "\n".join(
-        (goals_table(goals), cost, markdown(("environments", "GB resident"), processes))
-    )
+    us = costs.us_per_env_step
+    shown = {
+        "axis": costs.axis,
+        "size": costs.value.map("{:,}".format),
+        "µs an env step": us,
+        "range": costs.smallest.map("{:.3g} to ".format) + costs.largest.map("{:.3g}".format),
+        "env steps/s": (1e6 / us).map("{:,.0f}".format),
+    }
+    processes = {
+        "environments": memory.environments.map("{:,}".format),
+        "GB resident": memory.resident_gb.map("{:.3f}".format),
+    }
+    return "\n".join((goals_table(goals), markdown(Frame(shown)), markdown(Frame(processes))))
 
 
 # --- the picture -----------------------------------------------------------------------------

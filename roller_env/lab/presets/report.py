@@ -144,10 +144,16 @@ def publish(out: Path, docs: Path) -> list[Path]:
 
 def tables(settings: Frame, ablations: Frame) -> str:
     """Return the tables in Markdown, presets first and all settings folded away."""
-    modelled = ablations.assign(same=ablations.same_bits.map({True: "yes", False: "no"}))
-    classic = modelled[modelled.boxes == 0][["what", "geoms", "us_per_step", "same"]]
-    sizes = modelled[modelled.boxes > 0][["boxes", "what", "us_per_step", "same"]]
-    same = ("µs a step", "same to the bit")
+    titles = {
+        "what": "classic level",
+        "us_per_step": "µs a step",
+        "same_bits": "same to the bit",
+    }
+    modelled = ablations.replace({"same_bits": {True: "yes", False: "no"}}).rename(columns=titles)
+    classic = modelled[modelled.boxes == 0][
+        ["classic level", "geoms", "µs a step", "same to the bit"]
+    ]
+    sizes = modelled[modelled.boxes > 0][["boxes", "classic level", "µs a step", "same to the bit"]]
     limits = [
         [f"{one.title}, {one.unit}".removesuffix(", "), one.limit, one.reason]
         for one in REQUIREMENTS
@@ -157,23 +163,18 @@ def tables(settings: Frame, ablations: Frame) -> str:
         f"<details><summary>All {len(settings)} settings, the cheapest first</summary>\n",
         _settings_table(settings),
         "</details>\n",
-        markdown(("classic level", "geoms", *same), classic.to_numpy(object).tolist()),
-        markdown(("boxes", "modelled", *same), sizes.to_numpy(object).tolist()),
+        markdown(classic),
+        markdown(sizes.rename(columns={"classic level": "modelled"})),
         markdown(("requirement", "at most", "why"), limits),
     ]
     return "\n".join(parts)
 
 
 def _settings_table(settings: Frame) -> str:
-    cells = [
-        [
-            f"**{row['setting']}**" if row["front"] else row["setting"],
-            *(row[column] * scale for column, scale in _COLUMNS.values()),
-            row["violations"] or "-",
-        ]
-        for row in settings.to_dict("records")
-    ]
-    return markdown(("setting", *_COLUMNS, "violations"), cells)
+    names = settings.setting.mask(settings.front, "**" + settings.setting + "**")
+    shown = {title: settings[column] * scale for title, (column, scale) in _COLUMNS.items()}
+    violated = settings.violations.replace("", "-")
+    return markdown(Frame({"setting": names, **shown, "violations": violated}))
 
 
 def summary(settings: Frame, ablations: Frame) -> list[str]:
