@@ -170,7 +170,7 @@ def against_limits(
     xlabel: str,
     limits: tuple[float, float],
     *,
-    limit: float | None = 1.0,
+    limit: float = 1.0,
     label_in: float = 3.6,
 ) -> Figure:
     """Draw values on a logarithmic axis, a line a label, against one limit for all."""
@@ -178,8 +178,7 @@ def against_limits(
     series = list(dict.fromkeys(row.series for row in rows))
     panel, margins = (6.2, 0.24 * len(labels) + 0.3), (label_in, 1.5, 1.1, 0.8)
     figure, ((axes,),) = grid((1, 1), title, note, panel=panel, margins=margins)
-    if limit is not None:
-        axes.axvline(limit, color=PREDICTION, linewidth=1.0)
+    axes.axvline(limit, color=PREDICTION, linewidth=1.0)
     beside: dict[str, Any] = {"transform": axes.get_yaxis_transform(), "fontsize": 8}
     for row in rows:
         number = series.index(row.series)
@@ -264,9 +263,9 @@ def draw_scene(plot: Plot) -> Figure:
 
 
 @styled
-def draw_overview(plots: Sequence[Plot], columns: int = 3) -> Figure:
+def draw_overview(plots: Sequence[Plot]) -> Figure:
     """Draw the errors of several scenes against CPU time, a panel each."""
-    columns = min(columns, len(plots))
+    columns = min(3, len(plots))
     shape, margins = (math.ceil(len(plots) / columns), columns), (0.9, 2.7, 1.2, 0.8)
     figure, panels = grid(shape, "Error against cost", _note(plots), margins=margins)
     for axes in panels.ravel()[len(plots) :]:

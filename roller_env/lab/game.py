@@ -20,11 +20,11 @@ from roller_env.units import quants
 LOST: Final = 1e6
 """No number of a ball in the game is so large, m, m/s or rad/s."""
 
+# The original's ball, gravity and friction: its docs are in `roller_env.level.schema`.
 RADIUS_M: Final = quants(16.0)
 MASS_KG: Final = 1.0
 GRAVITY_M_S2: Final = quants(386.0)
 FRICTION: Final = 0.3
-"""The game's ball, gravity and friction: docs of the original, in `roller_env.level.schema`."""
 
 DECK_M: Final = quants(16.0)
 """Thickness of the original's decks."""
@@ -33,11 +33,9 @@ THROUGH_M: Final = RADIUS_M + DECK_M / 2
 
 GATE_SPEED_M_S: Final = quants(32.0)
 PLATE_SPEED_M_S: Final = quants(1.6)
-"""The original's gates and plates."""
-
 LIFT_N: Final = quants(500.0)
 LIFT_S: Final = 5.0
-"""The original's lift pad on its ball, and for how long."""
+"""Of the original's gates, plates and lift pads; how long a pad lifts."""
 
 TUBE_FALL_M: Final = 46.9
 """The highest that a pad and a tube of the classic level throw the ball over a deck."""

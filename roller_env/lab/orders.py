@@ -91,9 +91,6 @@ def slope(steps_s: Sequence[float], errors: Sequence[float]) -> tuple[float, flo
     return float(order), steps_s[above[-1]], steps_s[window.start]
 
 
-# --- what theory expects ---------------------------------------------------------------------
-
-
 class Expectation(NamedTuple):
     """Which methods' errors fall otherwise than by their order, and which of `REASONS` is why."""
 

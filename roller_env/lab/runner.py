@@ -74,9 +74,6 @@ def interleaved(
     return {name: tuple(taken) for name, taken in seconds.items()}
 
 
-# --- benchmark cases -------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Config:
     """How long an interleaved run is."""
@@ -150,8 +147,6 @@ def compare(cases: Sequence[Case], config: Config) -> Frame:
         case.verify()
     return Frame(seconds)
 
-
-# --- provenance ------------------------------------------------------------------------------
 
 _PACKAGES: Final = ("mujoco", "numpy", "numba", "scipy")
 _CPU_INFO: Final = Path("/proc/cpuinfo")

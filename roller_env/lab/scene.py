@@ -97,8 +97,6 @@ def measure(scene: Scene, method: Method, dt_s: float, repeats: int) -> list[dic
     ]
 
 
-# --- points ----------------------------------------------------------------------------------
-
 ERROR: Final = ["scene", "measure"]
 CURVE: Final = [*ERROR, "method"]
 

@@ -57,9 +57,6 @@ def random_actions(num_envs: int) -> Iterator[Int64]:
         yield rng.integers(len(DIRECTIONS), size=num_envs)
 
 
-# --- our environments ------------------------------------------------------------------------
-
-
 class Game(Case):
     """An environment of ours under random keys; what stands behind it does its physics again."""
 
@@ -111,9 +108,6 @@ class SingleStep(Game):
             _, _, terminated, truncated, _ = env.step(action[0])
             if terminated or truncated:
                 env.reset()
-
-
-# --- physics alone ---------------------------------------------------------------------------
 
 
 class PhysicsAlone(Case):
@@ -237,8 +231,6 @@ class BareLoop(PhysicsAlone):
         mujoco.mj_getState(self.model, self._data, state[0], STATE)
         return state
 
-
-# --- training end to end ---------------------------------------------------------------------
 
 _ROLLOUT_STEPS, _EPOCHS, _BATCHES = 64, 4, 4
 """Of a rollout. These are near those of configs/; all else are SB3's defaults."""

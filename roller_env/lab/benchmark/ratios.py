@@ -207,9 +207,6 @@ def profile(task: Task, say: Callable[[str], None]) -> Frame:
     return pd.concat(found, ignore_index=True)
 
 
-# --- pictures and tables ---------------------------------------------------------------------
-
-
 def draw_goals(goals: Frame, title: str) -> Figure:
     """Draw what was measured against its goal, better to the right."""
     rows = []

@@ -300,7 +300,7 @@ def draw(costs: Frame, memory: Frame, leak: Frame) -> Figure:
     blue = chart.SERIES[0]
     megabytes.plot(memory.environments, 1e3 * memory.resident_gb, "o-", color=blue)
     megabytes.axhline(1e3 * MEMORY_GOAL[2], color=chart.PREDICTION, ls="--")
-    _title(megabytes, f"MB resident; line: goal with {MEMORY_ENVS:,}")
+    _title(megabytes, f"MB resident; line: goal for {MEMORY_ENVS:,}")
     long_run.plot(leak.env_steps / 1e6, 1e3 * leak.resident_gb, color=blue)
     long_run.set_ylim(0.0, 1.3e3 * leak.resident_gb.max())
     _title(long_run, f"MB resident of {leak.environments[0]}, by million steps")

@@ -69,8 +69,6 @@ def costs(games: Mapping[Name, Games], rounds: int) -> dict[Name, dict[str, floa
     }
 
 
-# --- ablations -------------------------------------------------------------------------------
-
 Change = Callable[[mujoco.MjSpec, Level], None]
 Way = tuple[Setting, Change | None]
 """How a level is modelled: a setting, and what is then changed of the model."""

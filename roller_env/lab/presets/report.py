@@ -81,8 +81,6 @@ def front(points: Mapping[str, tuple[float, float]]) -> set[str]:
     }
 
 
-# --- files -----------------------------------------------------------------------------------
-
 _COLUMNS: Final[Mapping[str, tuple[str, float]]] = {
     "µs a step": ("us_per_step", 1.0),
     "CPU ms per s": ("cpu_s_per_s", 1e3),
@@ -144,16 +142,17 @@ def publish(out: Path, docs: Path) -> list[Path]:
 
 def tables(settings: Frame, ablations: Frame) -> str:
     """Return the tables in Markdown, presets first and all settings folded away."""
-    titles = {
-        "what": "classic level",
-        "us_per_step": "µs a step",
-        "same_bits": "same to the bit",
-    }
-    modelled = ablations.replace({"same_bits": {True: "yes", False: "no"}}).rename(columns=titles)
-    classic = modelled[modelled.boxes == 0][
-        ["classic level", "geoms", "µs a step", "same to the bit"]
-    ]
-    sizes = modelled[modelled.boxes > 0][["boxes", "classic level", "µs a step", "same to the bit"]]
+    modelled = Frame(
+        {
+            "boxes": ablations.boxes,
+            "modelled": ablations.what,
+            "geoms": ablations.geoms,
+            "µs a step": ablations.us_per_step,
+            "same to the bit": ablations.same_bits.map({True: "yes", False: "no"}),
+        }
+    )
+    classic = modelled[modelled.boxes == 0].drop(columns="boxes")
+    sizes = modelled[modelled.boxes > 0].drop(columns="geoms")
     limits = [
         [f"{one.title}, {one.unit}".removesuffix(", "), one.limit, one.reason]
         for one in REQUIREMENTS
@@ -163,8 +162,8 @@ def tables(settings: Frame, ablations: Frame) -> str:
         f"<details><summary>All {len(settings)} settings, the cheapest first</summary>\n",
         _settings_table(settings),
         "</details>\n",
-        markdown(classic),
-        markdown(sizes.rename(columns={"classic level": "modelled"})),
+        markdown(classic.rename(columns={"modelled": "classic level"})),
+        markdown(sizes),
         markdown(("requirement", "at most", "why"), limits),
     ]
     return "\n".join(parts)
@@ -194,8 +193,6 @@ def summary(settings: Frame, ablations: Frame) -> list[str]:
     lines.append(f"a step on {many.boxes} boxes costs {ratio:.2f} of one on {few.boxes}")
     return lines
 
-
-# --- pictures --------------------------------------------------------------------------------
 
 _KNOBS: Final = {
     "presets": "#111111",
