@@ -11,21 +11,13 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import tyro
 from tqdm import tqdm
 
-from roller_env.lab.accuracy import (
-    FULL,
-    QUICK,
-    cheapest_section,
-    orders_section,
-    pieces,
-    run,
-    scenes_named,
-    write,
-)
+from roller_env.lab import accuracy
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,18 +36,12 @@ class Arguments:
 
 def main(arguments: Arguments) -> None:
     """Do what the command line says."""
-    effort = QUICK if arguments.quick else FULL
-    scenes = scenes_named(arguments.scene, effort)
-    with tqdm(total=pieces(scenes, effort), unit="piece", dynamic_ncols=True) as bar:
-
-        def progress(done: str) -> None:
-            bar.set_postfix_str(done, refresh=False)
-            bar.update()
-
-        results = run(scenes, effort, progress)
-    files = write(results, arguments.out)
-    print(orders_section(results))
-    print(cheapest_section(results))
+    effort = accuracy.QUICK if arguments.quick else accuracy.FULL
+    scenes = accuracy.scenes_named(arguments.scene, effort)
+    results = accuracy.run(scenes, effort, partial(tqdm, dynamic_ncols=True))
+    files = accuracy.write(results, arguments.out)
+    print(accuracy.orders_section(results))
+    print(accuracy.cheapest_section(results))
     print(f"{len(files)} files in {arguments.out}; start with {files[-1]}")
 
 

@@ -17,7 +17,7 @@ from typing import Literal
 
 import tyro
 
-from roller_env.lab import chart, table
+from roller_env.lab import chart
 from roller_env.lab.benchmark import breakdown, ratios
 from roller_env.lab.benchmark.peers import INTERPRETER, PeerError
 from roller_env.lab.runner import Config, header, provenance
@@ -80,19 +80,18 @@ def main(arguments: Arguments) -> None:
     task = _task(arguments)
     if task.peers is None:
         print(f"peers: none at {arguments.peers}; their rows are not measured (make benchmark)")
-    measured = ratios.measure(task, _say)
-    facts = provenance(_PACKAGES) | {f"peer {k}": v for k, v in measured.versions.items()}
+    goals, speeds, versions = ratios.measure(task, _say)
+    facts = provenance(_PACKAGES) | {f"peer {k}": v for k, v in versions.items()}
     parts = ratios.profile(task, _say)
-    out = arguments.out
-    for name, rows in (("ratios", measured.goals), ("speeds", measured.speeds), ("parts", parts)):
-        table.write(rows, facts, out / name)
     title = f"{task.num_envs} environments, physics {arguments.physics}, {arguments.cores} cores"
-    goals = ratios.draw_goals(measured.goals, f"Speed against its goals: {title}")
-    chart.save(goals, facts, out / "ratios")
-    chart.save(breakdown.draw(parts), facts, out / "parts")
-    text = f"{header(facts)}\n\n{ratios.report(measured, parts)}"
-    (out / "benchmark.md").write_text(text, encoding="utf-8")
-    print(f"\n{text}\nTables and pictures: {out}")
+    figures = {
+        "ratios": ratios.draw_goals(goals, f"Speed against its goals: {title}"),
+        "parts": breakdown.draw(parts),
+    }
+    text = f"{header(facts)}\n\n{ratios.report(goals, speeds, parts)}"
+    tables = {"ratios": goals, "speeds": speeds, "parts": parts}
+    chart.write(arguments.out, facts, tables, figures, ("benchmark", text))
+    print(f"\n{text}\nTables and pictures: {arguments.out}")
 
 
 def _say(what: str) -> None:

@@ -18,9 +18,10 @@ from pathlib import Path
 import tyro
 from tqdm import tqdm
 
-from roller_env.lab.presets import ablations, report
-from roller_env.lab.presets.catalogue import SETTINGS
-from roller_env.lab.presets.results import FULL, QUICK, measure
+from roller_env.lab.presets import report
+from roller_env.lab.presets.costs import ablations
+from roller_env.lab.presets.report import FULL, QUICK
+from roller_env.lab.presets.settings import SETTINGS
 from roller_env.lab.runner import known, provenance
 
 
@@ -48,8 +49,8 @@ def main(arguments: Arguments) -> None:
     effort = QUICK if arguments.quick else FULL
     if arguments.only:
         effort = replace(effort, settings=_checked(arguments.only))
-    rows = measure(effort, _progress)
-    modelled = ablations.measure(effort.rounds, effort.boxes, effort.games)
+    rows = report.measure(effort, _progress)
+    modelled = ablations(effort.rounds, effort.boxes, effort.games)
     files = report.write(rows, modelled, provenance(), arguments.out)
     print(*report.summary(rows, modelled), sep="\n")
     print(f"{len(files)} files in {arguments.out}")

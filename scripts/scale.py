@@ -22,15 +22,15 @@ from roller_env.lab.runner import Config, header, provenance
 from roller_env.level.errors import LevelError
 
 _LONG = 10_000_000
-_QUICK = scale.Sizes(
-    environments=(1, 16),
-    substeps=(1, 4),
-    boxes=scale.BOXES_COMPARED,
-    coins=(0, 100),
-    threads=(1, 4),
-    threads_environments=(1, 16),
-    memory=(1, scale.MEMORY_ENVS),
-)
+_QUICK = {
+    "environments": (1, 16),
+    "substeps": (1, 4),
+    "boxes": scale.BOXES_COMPARED,
+    "coins": (0, 100),
+    "threads": (1, 4),
+    "threads_environments": (1, 16),
+    "memory": (1, scale.MEMORY_ENVS),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,14 +82,13 @@ def main(arguments: Arguments) -> None:
     memory, memory_goal = scale.measure_memory(task)
     _say(f"long run of {task.leak_steps:,} environment steps")
     leak = scale.measure_leak(task)
-    goals = table.frame([boxes_goal, memory_goal, scale.judge_leak(leak)])
-    facts, out = provenance(("mujoco", "numpy")), arguments.out
-    for name, rows in (("cost", costs), ("memory", memory), ("long_run", leak), ("goals", goals)):
-        table.write(rows, facts, out / name)
-    chart.save(scale.draw(costs, memory, leak), facts, out / "scale")
+    goals = table.Frame([boxes_goal, memory_goal, scale.judge_leak(leak)])
+    facts = provenance(("mujoco", "numpy"))
     text = f"{header(facts)}\n\n{scale.report(goals, costs, memory)}"
-    (out / "scale.md").write_text(text, encoding="utf-8")
-    print(f"\n{text}\nTables and pictures: {out}")
+    tables = {"cost": costs, "memory": memory, "long_run": leak, "goals": goals}
+    figures = {"scale": scale.draw(costs, memory, leak)}
+    chart.write(arguments.out, facts, tables, figures, ("scale", text))
+    print(f"\n{text}\nTables and pictures: {arguments.out}")
 
 
 def _say(what: str) -> None:
@@ -100,7 +99,7 @@ def _task(arguments: Arguments) -> scale.Task:
     names = ("level", "physics", "reward")
     task = scale.Task(
         config=Config(arguments.rounds, arguments.round_s, arguments.warm_up_s),
-        sizes=scale.Sizes(),
+        sizes=scale.SIZES,
         options={name: getattr(arguments, name) for name in names},
         num_envs=arguments.num_envs,
         num_threads=arguments.threads,

@@ -8,51 +8,40 @@ which the time step is halved, the table of orders.
 from __future__ import annotations
 
 import math
+import statistics
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property, partial
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, get_args
 
-import mujoco
-import numpy as np
 import pandas as pd
 
-from roller_env.lab import chart, table
-from roller_env.lab.chart import COSTS, ROUNDING, Cost, duration
+from roller_env.lab import chart
+from roller_env.lab.chart import duration
 from roller_env.lab.contact import CONTACT_SCENES
-from roller_env.lab.free import COMPLEX_BOX, FREE_SCENES, FreeScene, free_model
-from roller_env.lab.methods import MUJOCO, RIGID_BODY, Method, RigidBodyMethod
-from roller_env.lab.orders import EXACT, HORIZON_S, Order, measured_orders
-from roller_env.lab.runner import REPEATS, Median, header, interleaved, known, provenance, timed
-from roller_env.lab.scene import ERROR_KINDS, ErrorKind, Measure, Scene, measure
+from roller_env.lab.contact.scene import ContactScene
+from roller_env.lab.free import COMPLEX_BOX, FREE_SCENES, FreeScene
+from roller_env.lab.methods import FREE, Method, RigidBodyMethod
+from roller_env.lab.orders import EXACT, HORIZON_S, measured_orders
+from roller_env.lab.runner import REPEATS, header, interleaved, known, provenance, timed
+from roller_env.lab.scene import CURVE, ERROR, ErrorKind, failures, measure, sound
 from roller_env.lab.table import Frame, markdown
-from roller_env.rigid_body import advance
 
+Scene = FreeScene | ContactScene
 SCENES: Final[tuple[Scene, ...]] = (*FREE_SCENES, *CONTACT_SCENES)
 """Everything there is to measure on, free motion first."""
-
-Progress = Callable[[str], None]
-"""Is told what has been done after each piece of work."""
 
 
 @dataclass(frozen=True, slots=True)
 class Effort:
-    """How much a run does.
+    """How much a run does."""
 
-    Attributes:
-        quick: shorter free motions and coarser orders.
-        repeats: timings of which the median is taken.
-        rigid_body_evaluations: most evaluations of the forces in a run of our own integrators;
-            smaller time steps are left out.
-        time_steps: most time steps of a scene of contact, the largest ones.
-    """
-
-    quick: bool
-    repeats: int
-    rigid_body_evaluations: int
-    time_steps: int | None = None
+    quick: bool  # shorter free motions and coarser orders
+    repeats: int  # timings of which the median is taken
+    rigid_body_evaluations: int  # most of a run of our own integrators; smaller steps are left out
+    time_steps: int | None = None  # most of a scene of contact, the largest ones
 
 
 FULL: Final = Effort(quick=False, repeats=REPEATS, rigid_body_evaluations=400_000)
@@ -69,10 +58,8 @@ def scenes_named(names: Sequence[str], effort: Effort = FULL) -> list[Scene]:
         ValueError: when a scene does not exist, with the nearest name.
     """
     found = {scene.name: scene for scene in SCENES}
-    for name in names:
-        known("scene", name, list(found))
     wanted = names or (QUICK_SCENES if effort.quick else tuple(found))
-    chosen = [found[name] for name in dict.fromkeys(wanted)]
+    chosen = [found[known("scene", name, list(found))] for name in dict.fromkeys(wanted)]
     if not effort.quick:
         return chosen
     return [scene.over(HORIZON_S) if isinstance(scene, FreeScene) else scene for scene in chosen]
@@ -80,22 +67,20 @@ def scenes_named(names: Sequence[str], effort: Effort = FULL) -> list[Scene]:
 
 def time_steps(scene: Scene, method: Method, effort: Effort) -> list[float]:
     """Return the time steps that the effort allows, largest first."""
-    if isinstance(scene, FreeScene):
-        steps = list(scene.time_steps_s)
-    else:
-        steps = list(scene.time_steps_s)[: effort.time_steps]
-    if isinstance(method, RigidBodyMethod):
-        evaluations = method.evaluations * scene.horizon_s
-        return [dt for dt in steps if evaluations / dt <= 1.01 * effort.rigid_body_evaluations]
-    return steps
+    if isinstance(scene, FreeScene) and isinstance(method, RigidBodyMethod):
+        least = method.evaluations * scene.horizon_s / (1.01 * effort.rigid_body_evaluations)
+        return [dt for dt in scene.time_steps_s if dt >= least]
+    return list(scene.time_steps_s)[: None if isinstance(scene, FreeScene) else effort.time_steps]
 
 
-def pieces(scenes: Sequence[Scene], effort: Effort) -> int:
-    """Return how often `run` will report progress."""
-    points = sum(
-        len(time_steps(scene, method, effort)) for scene in scenes for method in scene.methods
-    )
-    return points + sum(isinstance(scene, FreeScene) for scene in scenes)
+def tries(scenes: Iterable[Scene], effort: Effort) -> list[tuple[Scene, Method, float]]:
+    """Return every scene with each of its methods and time steps."""
+    return [
+        (scene, method, dt_s)
+        for scene in scenes
+        for method in scene.methods
+        for dt_s in time_steps(scene, method, effort)
+    ]
 
 
 # --- answers ---------------------------------------------------------------------------------
@@ -107,114 +92,48 @@ ACCURATE: Final = 1e-2
 TIE: Final = 0.15
 """Costs within this of the cheapest count as the same: a shared machine's clock knows no better."""
 
-COST_COLUMN: Final[dict[Cost, str]] = {
-    "CPU time": "cpu_s_per_s",
-    "force evaluations": "evaluations_per_s",
-}
-
-
-def sound(curve: Frame, tolerance: float = math.inf) -> Frame:
-    """Return the points before the first that fails or errs more as time steps grow.
-
-    Later ones are luck: a larger step that happens to land near the answer is no method that has
-    the error.
-
-    Args:
-        curve: one method's points.
-        tolerance: largest error.
-    """
-    curve = curve.sort_values("dt_s", kind="stable")
-    bad = curve.failed | ~np.isfinite(curve.error) | (curve.error > tolerance)
-    return curve[~bad.cummax()]
-
-
-def failures(curve: Frame) -> Frame:
-    """Return the points at which one method failed, or gave no number, smallest step first."""
-    curve = curve.sort_values("dt_s", kind="stable")
-    return curve[curve.failed | ~np.isfinite(curve.error)]
-
-
-def curves(points: Frame, *keys: str) -> Iterable[tuple[Any, Frame]]:
-    """Return the points grouped by ``keys``, in the order in which they were measured."""
-    groups: Iterable[tuple[Any, Frame]] = points.groupby(list(keys), sort=False)
-    return groups
+_COSTS: Final = {"CPU time": "cpu_s_per_s", "force evaluations": "evaluations_per_s"}
+_ANSWER: Final = ("dt_s", "error", "times_real_time", "evaluations_per_s")
 
 
 def cheapest(points: Frame) -> Frame:
-    """Return the cheapest method for each tolerance, by each cost; NaN where none was tried.
-
-    Args:
-        points: of one measure a scene.
-    """
-    rows = []
-    for (scene, error), own in curves(points, "scene", "measure"):
+    """Return the cheapest method for each tolerance, by each cost; NaN where none was tried."""
+    points = points.assign(times_real_time=1.0 / points.cpu_s_per_s)
+    largest, rows = points.groupby(CURVE).dt_s.max(), []
+    for (scene, error), own in points.groupby(ERROR, sort=False):
         for tolerance in TOLERANCES:
-            kept = [sound(curve, tolerance) for _, curve in curves(own, "method")]
-            for cost in COSTS:
-                best = pd.concat(
-                    [one.nsmallest(1, COST_COLUMN[cost]) for one in kept if len(one)] or [own[:0]]
-                ).sort_values([COST_COLUMN[cost], "error"])
-                rows.append(
-                    {"scene": scene, "measure": error, "tolerance": tolerance, "cost": cost}
-                    | _best(best, own, COST_COLUMN[cost])
-                )
-    return table.frame(rows)
-
-
-def _best(best: Frame, every: Frame, column: str) -> dict[str, Any]:
-    if best.empty:
-        return dict.fromkeys(
-            ("dt_s", "error", "times_real_time", "evaluations_per_s"), math.nan
-        ) | {
-            "method": "",
-            "also": "",
-            "largest_tried": False,
-        }
-    first = best.iloc[0]
-    ties = best[1:][best[1:][column] <= first[column] * (1.0 + TIE)]
-    return {
-        "dt_s": first.dt_s,
-        "error": first.error,
-        "times_real_time": 1.0 / first.cpu_s_per_s,
-        "evaluations_per_s": first.evaluations_per_s,
-        "method": first.method,
-        "also": ", ".join(ties.method),
-        "largest_tried": bool(first.dt_s == every[every.method == first.method].dt_s.max()),
-    }
+            for cost, column in _COSTS.items():
+                best = sound(own, tolerance).sort_values([column, "error"])
+                best = best.drop_duplicates("method")
+                near = best[best[column] <= best[column].min() * (1.0 + TIE)]
+                first = near.iloc[0] if len(near) else dict.fromkeys(_ANSWER, math.nan)
+                method = near.method.iloc[0] if len(near) else ""
+                row = {"scene": scene, "measure": error, "tolerance": tolerance, "cost": cost}
+                row |= {key: first[key] for key in _ANSWER}
+                row |= {"method": method, "also": ", ".join(near.method[1:])}
+                tried = largest.get((scene, error, method))
+                rows.append(row | {"largest_tried": first["dt_s"] == tried})
+    return Frame(rows)
 
 
 def accurate_steps(points: Frame) -> Frame:
     """Return each method's largest accurate step, 0 for none, and the first that fails, or inf."""
-    rows = []
-    for (scene, error, method), curve in curves(points, "scene", "measure", "method"):
-        failed = failures(curve)
-        rows.append(
-            {
-                "scene": scene,
-                "method": method,
-                "measure": error,
-                "largest_dt_s": sound(curve, ACCURATE).dt_s.max() if len(curve) else 0.0,
-                "first_failing_dt_s": failed.dt_s.min() if len(failed) else math.inf,
-            }
-        )
-    return table.frame(rows).fillna({"largest_dt_s": 0.0})
-
-
-def pareto(points: Frame, cost: Cost) -> Frame:
-    """Return the points that no other beats in both error and cost, cheapest first.
-
-    All errors under `ROUNDING` are alike: none is better than exact.
-    """
-    candidates = pd.concat([sound(curve) for _, curve in curves(points, "method")])
-    candidates = candidates.sort_values([COST_COLUMN[cost], "error"])
-    least = candidates.error.cummin().shift(fill_value=math.inf)
-    return candidates[candidates.error.clip(lower=ROUNDING) < least]
+    steps = Frame(
+        {
+            "largest_dt_s": sound(points, ACCURATE).groupby(CURVE).dt_s.max(),
+            "first_failing_dt_s": failures(points).groupby(CURVE).dt_s.min(),
+        }
+    )
+    curves = pd.MultiIndex.from_frame(points[CURVE].drop_duplicates())
+    steps = steps.reindex(curves).fillna({"largest_dt_s": 0.0, "first_failing_dt_s": math.inf})
+    return steps.reset_index()
 
 
 # --- what a step costs -----------------------------------------------------------------------
 
 BATCHES: Final = (1, 1000)
 """Bodies that advance in one call of ours."""
+_COST_STEPS: Final = 20_000
 
 
 def step_costs(repeats: int) -> Frame:
@@ -224,61 +143,34 @@ def step_costs(repeats: int) -> Frame:
         ``method``, ``bodies`` that advance in one call, ``us_per_body_step`` (median) and
         ``us_per_body_evaluation``.
     """
-    start, acting, dt_s = COMPLEX_BOX.start, COMPLEX_BOX.acting, 1e-3
-    runs: dict[str, Callable[[], object]] = {}
-    cases: dict[str, tuple[Method, int, int]] = {}
-    for method in MUJOCO:
-        model = free_model(start.body, method, dt_s)
-        data = mujoco.MjData(model)
-        acting.apply(model, data)
-        runs[method.name] = partial(mujoco.mj_step, model, data, 2000)
-        cases[method.name] = (method, 1, 2000)
-    for ours in RIGID_BODY:
-        for bodies in BATCHES:
-            name, steps, batch = f"{ours.name} {bodies}", 20_000 // bodies, start.take([0] * bodies)
-            load = acting.load()
-            runs[name] = partial(advance, batch, ours.integrator, dt_s, steps, load=load)
-            cases[name] = (ours, bodies, steps)
-    for run in runs.values():
-        run()
-    turns = {name: partial(timed, run, time.thread_time) for name, run in runs.items()}
-    taken = interleaved(turns, repeats)
+    turns: dict[tuple[Method, int], Callable[[], float]] = {}
+    for method in FREE:
+        for bodies in BATCHES if isinstance(method, RigidBodyMethod) else (1,):
+            thrown = replace(COMPLEX_BOX, start=COMPLEX_BOX.start.take([0] * bodies))
+            work = partial(thrown.trial(method, 1e-3).simulate, _COST_STEPS // bodies, 1)
+            work()
+            turns[method, bodies] = partial(timed, work, time.thread_time)
     rows = []
-    for name, (case, bodies, steps) in cases.items():
-        us = 1e6 * Median.of(taken[name]).value / (steps * bodies)
-        rows.append(
-            {
-                "method": case.name,
-                "bodies": bodies,
-                "us_per_body_step": us,
-                "us_per_body_evaluation": us / case.evaluations,
-            }
-        )
-    return table.frame(rows)
+    for (method, bodies), seconds in interleaved(turns, repeats).items():
+        us = 1e6 * statistics.median(seconds) / _COST_STEPS
+        row = {"method": method.name, "bodies": bodies, "us_per_body_step": us}
+        rows.append(row | {"us_per_body_evaluation": us / method.evaluations})
+    return Frame(rows)
 
 
 def draw_step_costs(costs: Frame) -> Any:
     """Draw what a step costs a body, against MuJoCo's Runge-Kutta."""
     theirs = float(costs[costs.method == "MuJoCo RK4"].us_per_body_step.iloc[0])
-    rows = [
-        chart.Row(
-            f"{one.method}, {one.bodies:,} at a time",
-            one.us_per_body_step,
-            good=one.us_per_body_step <= theirs,
-            said=f"{theirs / one.us_per_body_step:.2g}x",
-        )
-        for one in costs.itertuples()
-    ]
-    return chart.against_limits(
-        rows,
-        "What a step of a free body costs",
+    note = (
         "On the thrown box, one thread. The line is MuJoCo's RK4; at the right how many steps of "
-        "each are done while it does one.",
-        "CPU µs a step of a body",
-        (0.05, 100.0),
-        limit=theirs,
-        label_in=3.2,
+        "each are done while it does one."
     )
+    rows = []
+    for one in costs.itertuples():
+        us, label = one.us_per_body_step, f"{one.method}, {one.bodies:,} at a time"
+        rows.append(chart.Row(label, us, good=us <= theirs, said=f"{theirs / us:.2g}x"))
+    said = ("What a step of a free body costs", note, "CPU µs a step of a body")
+    return chart.against_limits(rows, *said, (0.05, 100.0), limit=theirs, label_in=3.2)
 
 
 # --- results ---------------------------------------------------------------------------------
@@ -286,133 +178,70 @@ def draw_step_costs(costs: Frame) -> Any:
 
 @dataclass(frozen=True)
 class Results:
-    """What was measured of some scenes.
+    """What was measured of some scenes."""
 
-    Attributes:
-        scenes: as they were run.
-        points: rows of `roller_env.lab.scene.measure`.
-        orders: of the free scenes.
-        costs: of a step, for many bodies at a time; empty without free scenes.
-    """
+    scenes: Sequence[Scene]  # as they were run
+    points: Frame  # of `roller_env.lab.scene.measure`
+    orders: Frame  # of `roller_env.lab.orders.measured_orders`, of the free scenes
+    costs: Frame  # of `step_costs`; empty without free scenes
 
-    scenes: Sequence[Scene]
-    points: Frame
-    orders: Sequence[Order]
-    costs: Frame
-
-    def charted(self, kind: ErrorKind) -> list[tuple[Scene, Measure]]:
-        """Return the error of this kind that stands for each scene: its first. Not all have one."""
-        return [
-            (scene, next(one for one in scene.measures if one.kind == kind))
-            for scene in self.scenes
-            if any(one.kind == kind for one in scene.measures)
-        ]
-
-    def of(self, errors: Iterable[tuple[Scene, Measure]]) -> Frame:
-        """Return the points of some scenes' errors."""
-        wanted = pd.MultiIndex.from_tuples([(scene.name, one.name) for scene, one in errors])
-        own = pd.MultiIndex.from_frame(self.points[["scene", "measure"]])
-        return self.points[own.isin(wanted)]
-
-    @cached_property
-    def cheapest(self) -> Frame:
-        """The cheapest method for each tolerance, of every error that is charted."""
-        return cheapest(self.of([*self.charted("discretisation"), *self.charted("model")]))
-
-    @cached_property
-    def accurate(self) -> Frame:
-        """The largest accurate step of each method on each scene."""
-        return accurate_steps(self.of([(scene, scene.measures[0]) for scene in self.scenes]))
+    def charted(self, kind: ErrorKind) -> dict[str, chart.Plot]:
+        """Return the first error of a kind of every scene that has one, by the scene's name."""
+        plots = {}
+        for scene in self.scenes:
+            for error in [one for one in scene.measures if one.kind == kind][:1]:
+                own = self.points[self.points.scene == scene.name]
+                own = own[own.measure == error.name]
+                limits_s = scene.limits_s if isinstance(scene, FreeScene) else {}
+                plots[scene.name] = chart.Plot(scene.title, error.label, own, limits_s)
+        return plots
 
     @property
-    def disagreeing(self) -> list[Order]:
-        """The orders that are not as theory expects."""
-        return [order for order in self.orders if not order.agrees]
+    def cheapest(self) -> Frame:
+        """The cheapest method for each tolerance, of every error that is charted."""
+        plots = [plot for kind in get_args(ErrorKind) for plot in self.charted(kind).values()]
+        return cheapest(pd.concat([plot.points for plot in plots]))
 
-    def plot(self, scene: Scene, error: Measure) -> chart.Plot:
-        """Return what is drawn of one scene's error."""
-        own = self.of([(scene, error)])
-        found = {method: curve for (method,), curve in curves(own, "method")}
-        return chart.Plot(
-            title=scene.title,
-            label=error.label,
-            kind=error.kind,
-            curves={
-                method: [(p.dt_s, p.error, _costs(p)) for p in sound(curve).itertuples()]
-                for method, curve in found.items()
-            },
-            fronts={
-                cost: [
-                    (p.method, p.dt_s, p.error, _costs(p)[cost])
-                    for p in pareto(own, cost).itertuples()
-                ]
-                for cost in COSTS
-            },
-            failures={
-                method: (p.dt_s, _costs(p))
-                for method, curve in found.items()
-                for p in failures(curve)[:1].itertuples()
-            },
-            limits_s=getattr(scene, "limits_s", {}),
-        )
+    @property
+    def accurate(self) -> Frame:
+        """The largest accurate step of each method for the first error of each scene."""
+        first = self.points.groupby("scene").measure.transform("first")
+        return accurate_steps(self.points[self.points.measure == first])
 
 
-def _costs(point: Any) -> Mapping[Cost, float]:
-    return {cost: getattr(point, column) for cost, column in COST_COLUMN.items()}
-
-
-def run(scenes: Sequence[Scene], effort: Effort, progress: Progress) -> Results:
-    """Measure every method on every scene.
-
-    Args:
-        scenes: as `scenes_named` gives them.
-        effort: how much to do.
-        progress: is told of each of the `pieces`.
-    """
+def run(
+    scenes: Sequence[Scene], effort: Effort, watched: Callable[[Any], Iterable[Any]] = iter
+) -> Results:
+    """Measure every method on every scene; ``watched`` goes over a list and shows progress."""
     points: list[dict[str, Any]] = []
-    orders: list[Order] = []
-    for scene in scenes:
-        for method in scene.methods:
-            for dt_s in time_steps(scene, method, effort):
-                points += measure(scene, method, dt_s, effort.repeats)
-                progress(f"{scene.name}, {method.name}")
-        if isinstance(scene, FreeScene):
-            orders += measured_orders(scene, quick=effort.quick)
-            progress(f"{scene.name}, orders")
-    free = any(isinstance(scene, FreeScene) for scene in scenes)
-    return Results(
-        scenes, table.frame(points), orders, step_costs(effort.repeats) if free else Frame()
-    )
+    for scene, method, dt_s in watched(tries(scenes, effort)):
+        points += measure(scene, method, dt_s, effort.repeats)
+    free = [scene for scene in scenes if isinstance(scene, FreeScene)]
+    orders = [row for scene in watched(free) for row in measured_orders(scene, quick=effort.quick)]
+    costs = step_costs(effort.repeats) if free else Frame()
+    return Results(scenes, Frame(points), Frame(orders), costs)
 
 
 def write(results: Results, out: Path) -> list[Path]:
     """Write the tables and the charts of ``results`` into a directory, and return their paths."""
     facts = provenance()
-    files: list[Path] = []
-    orders = table.frame(results.orders) if results.orders else Frame()
-    for name, rows in (
-        ("points", results.points),
-        ("orders", orders),
-        ("cheapest", results.cheapest),
-        ("accurate_steps", results.accurate),
-        ("step_costs", results.costs),
-    ):
-        if len(rows):
-            files += table.write(rows, facts, out / name)
-    if len(results.costs):
-        files += chart.save(draw_step_costs(results.costs), facts, out / "step-costs")
-    for kind in ERROR_KINDS:
-        plots = [(scene, results.plot(scene, one)) for scene, one in results.charted(kind)]
-        for scene, plot in plots:
-            files += chart.save(chart.draw_scene(plot), facts, out / f"{scene.name}-{kind}")
+    tables = {
+        "points": results.points,
+        "orders": results.orders,
+        "cheapest": results.cheapest,
+        "accurate_steps": results.accurate,
+        "step_costs": results.costs,
+    }
+    figures = {"step-costs": draw_step_costs(results.costs)} if len(results.costs) else {}
+    free = [scene.name for scene in results.scenes if isinstance(scene, FreeScene)]
+    for kind in get_args(ErrorKind):
+        plots = results.charted(kind)
+        figures |= {f"{name}-{kind}": chart.draw_scene(plot) for name, plot in plots.items()}
         for where in ("free", "contact"):
-            some = [p for s, p in plots if isinstance(s, FreeScene) == (where == "free")]
+            some = [plot for name, plot in plots.items() if (name in free) == (where == "free")]
             if len(some) > 1:
-                figure = chart.draw_overview(some)
-                files += chart.save(figure, facts, out / f"overview-{where}-{kind}")
-    text = out / "accuracy.md"
-    text.write_text(page(results, facts), encoding="utf-8")
-    return [*files, text]
+                figures[f"overview-{where}-{kind}"] = chart.draw_overview(some)
+    return chart.write(out, facts, tables, figures, ("accuracy", page(results, facts)))
 
 
 # --- the page --------------------------------------------------------------------------------
@@ -441,77 +270,61 @@ def page(results: Results, facts: Mapping[str, str]) -> str:
 
 def orders_section(results: Results) -> str:
     """Return the table of orders, and the reasons of those that are not the method's own."""
-    if not results.orders:
+    if results.orders.empty:
         return ""
-    number, wrong = len(results.orders), results.disagreeing
-    found = {(one.scene, one.measure, one.method): one for one in results.orders}
-    columns = {
-        t: key for t, key in _SUITED.items() if any(o.scene == key[0] for o in results.orders)
-    }
-    cells = []
-    for method in dict.fromkeys(one.method for one in results.orders):
-        own = [found.get((*key, method)) for key in columns.values()]
-        theory = next((one.theory for one in own if one), math.nan)
-        cells.append([method, f"{theory:g}", *map(_order, own)])
+    orders = results.orders.assign(shown=results.orders.measured.map(_order))
+    wrong, odd = orders[~orders.agrees], orders[orders.reason != ""]
+    wide = orders.pivot_table("shown", "method", ERROR, "first", sort=False).fillna("-")
+    columns = {title: wide[key] for title, key in _SUITED.items() if key in wide}
+    theory = orders.groupby("method", sort=False).theory.first().map("{:g}".format)
     parts = [
         f"The power of dt with which an error falls, measured over the last three halvings above "
-        f"rounding, in motions of {HORIZON_S:g} s. Of {number} slopes {number - len(wrong)} are "
-        "within 0.15 of what theory expects.\n",
-        markdown(["method", "theory", *columns], cells) if columns else "",
+        f"rounding, in motions of {HORIZON_S:g} s. Of {len(orders)} slopes "
+        f"{len(orders) - len(wrong)} are within 0.15 of what theory expects.\n"
     ]
-    if wrong:
-        rows = [[one.scene, one.measure, one.method, one.theory, _order(one)] for one in wrong]
-        titles = ["scene", "error", "method", "theory", "measured"]
-        parts.append("Not as theory expects:\n\n" + markdown(titles, rows))
+    if columns:
+        parts.append(markdown(Frame({"theory": theory} | columns).reset_index()))
+    if len(wrong):
+        titles = {"measure": "error", "shown": "measured"}
+        unlike = wrong[[*CURVE, "theory", "shown"]].rename(columns=titles)
+        parts.append("Not as theory expects:\n\n" + markdown(unlike))
     parts.append("Where theory does not expect the method's own order, and why:\n")
-    parts.append(_reasons(results.orders))
-    return "\n".join(part for part in parts if part)
+    reasons = ""
+    for reason, own in odd.groupby("reason"):
+        scenes, measures, methods = (", ".join(own[key].unique()) for key in CURVE)
+        found = ", ".join(sorted(set(own.shown)))
+        measures = measures.replace("_", " ")
+        reasons += f"- **{measures}** on {scenes}: {found}. {reason}. ({methods})\n"
+    return "\n".join([*parts, reasons])
 
 
-def _order(order: Order | None) -> str:
-    if order is None or math.isnan(order.measured):
-        return "-"
-    return "exact" if order.measured == EXACT else f"{order.measured:.2f}"
-
-
-def _reasons(orders: Sequence[Order]) -> str:
-    """Return a list of the reasons with the cases that each is about."""
-    lines = []
-    for reason in sorted({one.reason for one in orders if one.reason}):
-        cases = [one for one in orders if one.reason == reason]
-        scenes = ", ".join(dict.fromkeys(one.scene for one in cases))
-        measures = ", ".join(dict.fromkeys(one.measure.replace("_", " ") for one in cases))
-        measured = ", ".join(sorted({_order(one) for one in cases}))
-        methods = ", ".join(dict.fromkeys(one.method for one in cases))
-        lines.append(f"- **{measures}** on {scenes}: {measured}. {reason}. ({methods})\n")
-    return "".join(lines)
+def _order(order: float) -> str:
+    return "-" if math.isnan(order) else "exact" if order == EXACT else f"{order:.2f}"
 
 
 def cheapest_section(results: Results) -> str:
     """Return the table of the cheapest method for each tolerance."""
-    labels = {
-        (scene.name, one.name): f"{one.label} ({kind})"
-        for kind in ERROR_KINDS
-        for scene, one in results.charted(kind)
-    }
-    rows: list[list[object]] = []
-    said = None
-    for (scene, error, tolerance), own in curves(results.cheapest, "scene", "measure", "tolerance"):
-        names = ["", ""] if said == (scene, error) else [scene, labels[scene, error]]
-        said = scene, error
-        rows.append([*names, f"{tolerance:.0e}", *(_answer(one) for one in own.itertuples())])
+    answers = results.cheapest
+    answers["said"] = [_answer(answer) for answer in answers.itertuples()]
+    said = answers.groupby([*ERROR, "tolerance"]).said.agg(list)
+    rows = []
+    for kind in get_args(ErrorKind):
+        for scene, plot in results.charted(kind).items():
+            names = [scene, f"{plot.label} ({kind})"]
+            for tolerance in TOLERANCES:
+                both = said[scene, plot.points.measure.iloc[0], tolerance]
+                rows.append([*names, f"{tolerance:.0e}", *both])
+                names = ["", ""]
     titles = ["scene", "error", "at most", "least CPU time", "fewest evaluations of the forces"]
-    return markdown(titles, rows) if rows else ""
+    return markdown(titles, rows)
 
 
 def _answer(answer: Any) -> str:
     if not answer.method:
         return "none that was tried"
-    price = (
-        f"{answer.times_real_time:,.0f} times real time"
-        if answer.cost == "CPU time"
-        else f"{answer.evaluations_per_s:,.0f} a second"
-    )
+    price = f"{answer.evaluations_per_s:,.0f} a second"
+    if answer.cost == "CPU time":
+        price = f"{answer.times_real_time:,.0f} times real time"
     also = f"; as cheap: {answer.also}" if answer.also else ""
     edge = ", the largest tried" if answer.largest_tried else ""
     return f"{answer.method} at {duration(answer.dt_s)}{edge} ({price}){also}"
@@ -519,21 +332,19 @@ def _answer(answer: Any) -> str:
 
 def accurate_section(results: Results) -> str:
     """Return the tables of the largest accurate steps, MuJoCo's and ours."""
-    parts = [
+    text = (
         f"The largest time step that was tried with which the scene's first error stays under "
         f"{ACCURATE:g}, as with every smaller one; in brackets the smallest that fails.\n"
-    ]
+    )
+    steps = results.accurate
+    steps["shown"] = [_accurate(row) for row in steps.itertuples()]
     for family in ("MuJoCo ", "ours "):
-        own = results.accurate[results.accurate.method.str.startswith(family)]
-        found = {(one.scene, one.method): _accurate(one) for one in own.itertuples()}
-        methods = list(dict.fromkeys(own.method))
-        rows = [
-            [scene, *(found.get((scene, method), "") for method in methods)]
-            for scene in dict.fromkeys(own.scene)
-        ]
-        titles = ["scene", *(method.removeprefix(family) for method in methods)]
-        parts.append(markdown(titles, rows) if rows else "")
-    return "\n".join(parts)
+        own = steps[steps.method.str.startswith(family)]
+        if len(own):
+            wide = own.pivot_table("shown", "scene", "method", "first", sort=False).fillna("")
+            wide.columns = wide.columns.str.removeprefix(family)
+            text += "\n" + markdown(wide.reset_index())
+    return text
 
 
 def _accurate(row: Any) -> str:
@@ -547,18 +358,9 @@ def costs_section(results: Results) -> str:
     if results.costs.empty:
         return ""
     costs = results.costs.pivot_table("us_per_body_step", "method", "bodies", sort=False)
-    least = results.costs.groupby("method").us_per_body_evaluation.min()
-    theirs = costs.loc["MuJoCo RK4", 1]
-    rows = [
-        [
-            method,
-            *("" if math.isnan(us) else us for us in own),
-            float(least[method]),
-            f"{theirs / own.min():.2g}",
-        ]
-        for method, own in costs.iterrows()
-    ]
-    titles = ["method", *(f"µs a step, {n:,} at a time" for n in BATCHES)]
-    return "Per body, on the thrown box, one thread.\n\n" + markdown(
-        [*titles, "least µs an evaluation", "steps while MuJoCo RK4 does one"], rows
-    )
+    steps = costs.loc["MuJoCo RK4", 1] / costs.min(axis=1)
+    wide = costs.astype(object).where(costs.notna(), "")
+    wide.columns = [f"µs a step, {n:,} at a time" for n in BATCHES]
+    wide["least µs an evaluation"] = results.costs.groupby("method").us_per_body_evaluation.min()
+    wide["steps while MuJoCo RK4 does one"] = steps.map("{:.2g}".format)
+    return "Per body, on the thrown box, one thread.\n\n" + markdown(wide.reset_index())

@@ -1,8 +1,7 @@
 """Every picture of the laboratory: one look, one way to save, and the shapes that recur.
 
 A colour means the same method everywhere. `grid` makes a page of panels, `against_limits` rows of
-what was measured beside what was allowed, `label` writes names where there is room for them, and
-`error_against_cost` is the chart of a method a curve, a time step a point.
+what was measured beside what was allowed, and `label` writes names where there is room for them.
 """
 
 from __future__ import annotations
@@ -10,9 +9,9 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import matplotlib
 import numpy as np
@@ -22,9 +21,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
+from pandas import concat
 
+from roller_env.lab import table
 from roller_env.lab.runner import header
-from roller_env.lab.scene import ErrorKind
+from roller_env.lab.scene import ROUNDING, ErrorKind, failures, pareto, sound
+from roller_env.lab.table import Frame
 
 STYLE: Final[dict[Any, Any]] = {
     "axes.edgecolor": "#888888",
@@ -38,6 +40,9 @@ STYLE: Final[dict[Any, Any]] = {
     "svg.hashsalt": "roller",
 }
 """Of every picture. The salt makes the same chart the same SVG."""
+
+styled: Final = matplotlib.rc_context(STYLE)
+"""Decorates what draws."""
 
 COLOURS: Final[dict[str, str]] = {
     "MuJoCo Euler": "#2f6db3",
@@ -71,23 +76,40 @@ def colour(method_name: str) -> str:
     return COLOURS[method_name.partition(",")[0]]
 
 
+@styled
 def save(figure: Figure, facts: Mapping[str, str], stem: Path) -> tuple[Path, Path]:
-    """Write the figure as ``stem.png`` and ``stem.svg`` with its provenance along the foot.
-
-    Returns:
-        Both paths.
-    """
+    """Write ``stem.png`` and ``stem.svg`` with provenance along the foot; return both paths."""
     foot: dict[str, Any] = {"fontsize": 6, "color": "#777777", "ha": "left", "va": "bottom"}
     figure.text(0.005, 0.004, header(facts), wrap=True, **foot)
     stem.parent.mkdir(parents=True, exist_ok=True)
     # Not with_suffix: a scene's name may have a point in it.
     png, svg = (stem.with_name(f"{stem.name}.{kind}") for kind in ("png", "svg"))
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(png, dpi=150, facecolor="white")
-        figure.savefig(svg, facecolor="white", metadata={"Date": None})
+    figure.savefig(png, dpi=150, facecolor="white")
+    figure.savefig(svg, facecolor="white", metadata={"Date": None})
     return png, svg
 
 
+def write(
+    out: Path,
+    facts: Mapping[str, str],
+    tables: Mapping[str, Frame],
+    figures: Mapping[str, Figure],
+    page: tuple[str, str] = ("", ""),
+) -> list[Path]:
+    """Write an experiment's tables, figures and Markdown page, by their names; return the files."""
+    files: list[Path] = []
+    for name, rows in tables.items():
+        files += table.write(rows, facts, out / name) if len(rows) else ()
+    for name, figure in figures.items():
+        files += save(figure, facts, out / name)
+    name, text = page
+    if text:
+        files.append(out / f"{name}.md")
+        files[-1].write_text(text, encoding="utf-8")
+    return files
+
+
+@styled
 def grid(
     shape: tuple[int, int],
     title: str,
@@ -97,51 +119,29 @@ def grid(
     margins: tuple[float, float, float, float] = (0.9, 0.5, 1.0, 0.7),
     **subplots: Any,
 ) -> tuple[Figure, npt.NDArray[Any]]:
-    """Return a page of panels under a headline.
+    """Return a page of panels, (rows, columns), under a headline and a note.
 
-    Args:
-        shape: rows and columns.
-        title: the headline.
-        note: a line below it, broken where it is too long.
-        panel: width and height of a panel, inches.
-        margins: left, right, top and bottom of the page, inches.
-        **subplots: further arguments of ``Figure.subplots``.
-
-    Returns:
-        The figure, and its panels (rows, columns).
+    ``panel`` is a panel's width and height, ``margins`` are the page's left, right, top and bottom,
+    inches; the other arguments are of ``Figure.subplots``.
     """
     rows, columns = shape
     left, right, top, bottom = margins
     width, height = left + right + panel[0] * columns, top + bottom + panel[1] * rows
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(width, height))
-        panels = figure.subplots(rows, columns, squeeze=False, **subplots)
-        figure.subplots_adjust(
-            left=left / width,
-            right=1.0 - right / width,
-            top=1.0 - top / height,
-            bottom=bottom / height,
-            wspace=0.28,
-            hspace=0.45,
-        )
-        said = textwrap.fill(note, round(14.5 * width))
-        figure.text(0.012, 1.0 - 0.3 / height, title, fontsize=14, weight="bold", va="center")
-        figure.text(0.012, 1.0 - 0.5 / height, said, fontsize=9, color=QUIET, va="top")
+    figure = Figure(figsize=(width, height))
+    panels = figure.subplots(rows, columns, squeeze=False, **subplots)
+    x, y = (left / width, 1.0 - right / width), (bottom / height, 1.0 - top / height)
+    figure.subplots_adjust(x[0], y[0], x[1], y[1], wspace=0.28, hspace=0.45)
+    said = textwrap.fill(note, round(14.5 * width))
+    figure.text(0.012, 1.0 - 0.3 / height, title, fontsize=14, weight="bold", va="center")
+    figure.text(0.012, 1.0 - 0.5 / height, said, fontsize=9, color=QUIET, va="top")
     return figure, panels
 
 
 def legend_of(figure: Figure, axes: Axes, columns: int = 4) -> None:
     """Write one legend for a page whose panels all show what ``axes`` shows."""
-    handles, labels = axes.get_legend_handles_labels()
-    unique = dict(zip(labels, handles, strict=True))
-    figure.legend(
-        unique.values(),
-        unique.keys(),
-        loc="lower right",
-        ncols=columns,
-        fontsize=8,
-        bbox_to_anchor=(0.995, 0.012),
-    )
+    unique = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    where: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (0.995, 0.012)}
+    figure.legend(unique.values(), unique.keys(), ncols=columns, fontsize=8, **where)
 
 
 def plain(axis: Any) -> None:
@@ -152,25 +152,17 @@ def plain(axis: Any) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One row of `against_limits`.
-
-    Attributes:
-        label: what it is.
-        value: on the axis; NaN where it was not measured.
-        span: smallest and largest, which are drawn as a line; or what is allowed.
-        good: whether it is on the right side.
-        series: of several, by whose colour it is drawn; empty for good or not.
-        said: what is written right of it.
-    """
+    """One row of `against_limits`."""
 
     label: str
-    value: float
-    span: tuple[float, float] = (math.nan, math.nan)
-    good: bool = True
-    series: str = ""
-    said: str = ""
+    value: float  # NaN where it was not measured
+    span: tuple[float, float] = (math.nan, math.nan)  # smallest and largest, or what is allowed
+    good: bool = True  # whether it is on the right side
+    series: str = ""  # of several, by whose colour it is drawn; empty for good or not
+    said: str = ""  # right of it
 
 
+@styled
 def against_limits(
     rows: Sequence[Row],
     title: str,
@@ -178,84 +170,54 @@ def against_limits(
     xlabel: str,
     limits: tuple[float, float],
     *,
-    limit: float | None = 1.0,
+    limit: float = 1.0,
     label_in: float = 3.6,
 ) -> Figure:
     """Draw values on a logarithmic axis, a line a label, against one limit for all."""
     labels = list(dict.fromkeys(row.label for row in rows))
     series = list(dict.fromkeys(row.series for row in rows))
-    figure, ((axes,),) = grid(
-        (1, 1),
-        title,
-        note,
-        panel=(6.2, 0.24 * len(labels) + 0.3),
-        margins=(label_in, 1.5, 1.1, 0.8),
-    )
-    with matplotlib.rc_context(STYLE):
-        if limit is not None:
-            axes.axvline(limit, color=PREDICTION, linewidth=1.0)
-        for row in rows:
-            shift = 0.22 * (series.index(row.series) - (len(series) - 1) / 2.0)
-            at = labels.index(row.label) + shift
-            mine = (
-                SERIES[series.index(row.series)] if row.series else (GOOD if row.good else FAILURE)
-            )
-            axes.plot(row.span, (at, at), color="#bbbbbb", linewidth=4.0, solid_capstyle="butt")
-            axes.plot(np.clip(row.value, *limits), at, "o", color=mine, markersize=5)
-            if row.said:
-                axes.text(1.02, at, row.said, transform=axes.get_yaxis_transform(), va="center",
-                          fontsize=8, color=mine)  # fmt: skip
-        axes.set(xscale="log", xlim=limits, ylim=(len(labels) - 0.4, -0.6))
-        axes.set_xlabel(xlabel, fontsize=9)
-        axes.set_yticks(range(len(labels)), labels, fontsize=7.5)
-        plain(axes.xaxis)
-        axes.grid(axis="y", visible=False)
-        if len(series) > 1:
-            marks = [Line2D([], [], marker="o", ls="", color=SERIES[i]) for i in range(len(series))]
-            axes.legend(marks, series, loc="lower right", fontsize=8)
+    panel, margins = (6.2, 0.24 * len(labels) + 0.3), (label_in, 1.5, 1.1, 0.8)
+    figure, ((axes,),) = grid((1, 1), title, note, panel=panel, margins=margins)
+    axes.axvline(limit, color=PREDICTION, linewidth=1.0)
+    beside: dict[str, Any] = {"transform": axes.get_yaxis_transform(), "fontsize": 8}
+    for row in rows:
+        number = series.index(row.series)
+        at = labels.index(row.label) + 0.22 * (number - (len(series) - 1) / 2.0)
+        mine = SERIES[number] if row.series else (GOOD if row.good else FAILURE)
+        axes.plot(row.span, (at, at), color="#bbbbbb", linewidth=4.0, solid_capstyle="butt")
+        axes.plot(np.clip(row.value, *limits), at, "o", color=mine, markersize=5)
+        axes.text(1.02, at, row.said, va="center", color=mine, **beside)
+    axes.set(xscale="log", xlim=limits, ylim=(len(labels) - 0.4, -0.6))
+    axes.set_xlabel(xlabel, fontsize=9)
+    axes.set_yticks(range(len(labels)), labels, fontsize=7.5)
+    plain(axes.xaxis)
+    axes.grid(axis="y", visible=False)
+    if len(series) > 1:
+        marks = [Line2D([], [], marker="o", ls="", color=SERIES[i]) for i in range(len(series))]
+        axes.legend(marks, series, loc="lower right", fontsize=8)
     return figure
 
 
-def label(axes: Axes, names: Iterable[tuple[str, float, float, str]], **style: Any) -> None:
-    """Write names beside points of a panel with final limits, and move them apart.
-
-    Args:
-        axes: of the chart.
-        names: text, x, y and colour of each.
-        **style: further arguments of ``Axes.text``.
-    """
+def label(axes: Axes, names: Iterable[tuple[str, float, float, str]]) -> None:
+    """Write names, (text, x, y, colour), beside points of a panel with final limits, and apart."""
     points = list(names)
-    if not points:
-        return
-    texts = [axes.text(x, y, text, color=c, **{"fontsize": 7, **style}) for text, x, y, c in points]
-    axes.figure.canvas.draw()
-    adjust_text(
-        texts,
-        [x for _, x, _, _ in points],
-        [y for _, _, y, _ in points],
-        ax=axes,
-        arrowprops={"arrowstyle": "-", "color": "#999999", "linewidth": 0.5},
-        iter_lim=120,
-    )
+    if points:
+        texts = [axes.text(x, y, text, color=c, fontsize=7) for text, x, y, c in points]
+        axes.figure.canvas.draw()
+        _, x, y, _ = zip(*points, strict=True)
+        arrow = {"arrowstyle": "-", "color": "#999999", "linewidth": 0.5}
+        adjust_text(texts, x, y, ax=axes, arrowprops=arrow, iter_lim=120)
 
 
 # --- error against cost ----------------------------------------------------------------------
 
-Cost = Literal["CPU time", "force evaluations"]
-COSTS: Final[tuple[Cost, ...]] = ("CPU time", "force evaluations")
-
-ROUNDING: Final = 1e-13
-"""Errors below it are rounding of float64: the answer is exact."""
-
-_COST_COLUMN: Final[dict[Cost, str]] = {
-    "CPU time": "cpu_s_per_s",
-    "force evaluations": "evaluations_per_s",
+COSTS: Final[Mapping[str, str]] = {
+    "cpu_s_per_s": "CPU seconds for a simulated second",
+    "evaluations_per_s": "evaluations of the forces for a simulated second",
 }
-_COST_LABELS: Final[dict[Cost, str]] = {
-    "CPU time": "CPU seconds for a simulated second",
-    "force evaluations": "evaluations of the forces for a simulated second",
-}
-_KINDS: Final[dict[ErrorKind, str]] = {
+"""The columns of `roller_env.lab.scene.measure` that are costs, with an axis' label."""
+
+_KINDS: Final[Mapping[ErrorKind, str]] = {
     "discretisation": "Discretisation error: against the same model with a vanishing time step.",
     "model": "Model error: against the rigid closed form, which a soft contact does not approach "
     "however small the step.",
@@ -264,77 +226,72 @@ _SHOWN: Final = (1e-16, 1e12)
 """Errors beyond these are drawn at them."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Plot:
-    """One scene's error, with all that is drawn of it.
+    """One scene's error to be drawn."""
 
-    Attributes:
-        title: of the scene.
-        label: of the error's axis.
-        kind: of the error.
-        curves: method, and its points before the first that fails: (dt_s, error, {cost: value}),
-            smallest time step first.
-        fronts: of each cost, the points that no other beats: (method, dt_s, error, value).
-        failures: method, its smallest failing step and what that costs.
-        limits_s: method and the time step above which it is predicted to blow up.
-    """
+    title: str  # of the scene
+    label: str  # of the error's axis
+    points: Frame  # of the error, rows of `roller_env.lab.scene.measure`
+    limits_s: Mapping[str, float]  # time step above which a method is predicted to blow up
 
-    title: str
-    label: str
-    kind: ErrorKind
-    curves: Mapping[str, Sequence[tuple[float, float, Mapping[Cost, float]]]]
-    fronts: Mapping[Cost, Sequence[tuple[str, float, float, float]]]
-    failures: Mapping[str, tuple[float, Mapping[Cost, float]]]
-    limits_s: Mapping[str, float] = field(default_factory=dict)
+    def curves(self) -> dict[str, Frame]:
+        """Return every method's sound points, smallest step first."""
+        curves = dict(iter(sound(self.points).groupby("method")))
+        return {name: curves[name] for name in self.points.method.unique() if name in curves}
 
 
+@styled
 def draw_scene(plot: Plot) -> Figure:
     """Draw one scene's error against both costs."""
-    note = f"{_KINDS[plot.kind]} Lower left is better; labels are time steps. {_alike(plot)}"
-    figure, panels = grid((1, 2), plot.title, note, panel=(5.2, 5.0), margins=(0.9, 2.6, 1.7, 0.8),
-                          sharey=True)  # fmt: skip
-    with matplotlib.rc_context(STYLE):
-        for axes, cost in zip(panels[0], COSTS, strict=True):
-            _draw_panel(axes, plot, cost)
-            _draw_guides(axes)
-            axes.set_xlabel(_COST_LABELS[cost])
-            ends = [(m, c[end]) for m, c in plot.curves.items() for end in {0, len(c) - 1} if c]
-            at_ends = [
-                (duration(dt), costs[cost], _clipped(error), colour(method))
-                for method, (dt, error, costs) in ends
-            ]
-            front = [(duration(dt), x, _clipped(e), colour(m)) for m, dt, e, x in plot.fronts[cost]]
-            label(axes, dict.fromkeys([*front, *at_ends]))
-        panels[0, 0].set_ylabel(plot.label)
-        figure.legend(handles=_legend([plot]), loc="center right", fontsize=8)
+    note = f"{_note([plot])} Labels are time steps. {_alike(plot)}"
+    figure, panels = grid(
+        (1, 2), plot.title, note, panel=(5.2, 5.0), margins=(0.9, 2.6, 1.7, 0.8), sharey=True
+    )
+    for axes, (cost, title) in zip(panels[0], COSTS.items(), strict=True):
+        _draw_panel(axes, plot, cost)
+        _draw_guides(axes)
+        axes.set_xlabel(title)
+        ends = [curve.iloc[[0, -1]] for curve in plot.curves().values()]
+        named = concat([pareto(plot.points, cost), *ends])
+        clipped, colours = named.error.clip(*_SHOWN), named.method.map(colour)
+        names = zip(named.dt_s.map(duration), named[cost], clipped, colours, strict=True)
+        label(axes, dict.fromkeys(names))
+    panels[0, 0].set_ylabel(plot.label)
+    figure.legend(handles=_legend([plot]), loc="center right", fontsize=8)
     return figure
 
 
-def draw_overview(plots: Sequence[Plot], columns: int = 3) -> Figure:
+@styled
+def draw_overview(plots: Sequence[Plot]) -> Figure:
     """Draw the errors of several scenes against CPU time, a panel each."""
-    columns = min(columns, len(plots))
-    lines = math.ceil(len(plots) / columns)
-    figure, panels = grid((lines, columns), "Error against cost", f"{_KINDS[plots[0].kind]} Lower "
-                          "left is better.", margins=(0.9, 2.7, 1.2, 0.8))  # fmt: skip
-    with matplotlib.rc_context(STYLE):
-        for axes, plot in zip(panels.ravel(), plots, strict=False):
-            _draw_panel(axes, plot, "CPU time")
-            axes.set_title(textwrap.fill(plot.title, 46), fontsize=10, weight="bold", loc="left")
-            axes.set_ylabel(plot.label, fontsize=8)
-            axes.set_xlabel(_COST_LABELS["CPU time"], fontsize=8)
-        for axes in panels.ravel()[len(plots) :]:
-            axes.set_axis_off()
-        figure.legend(handles=_legend(plots), loc="center right", fontsize=9)
+    columns = min(3, len(plots))
+    shape, margins = (math.ceil(len(plots) / columns), columns), (0.9, 2.7, 1.2, 0.8)
+    figure, panels = grid(shape, "Error against cost", _note(plots), margins=margins)
+    for axes in panels.ravel()[len(plots) :]:
+        axes.set_axis_off()
+    for axes, plot in zip(panels.ravel(), plots, strict=False):
+        _draw_panel(axes, plot, "cpu_s_per_s")
+        # Above the marks of what is predicted to blow up, which stand on the frame.
+        said: dict[str, Any] = {"fontsize": 10, "weight": "bold", "pad": 12 if plot.limits_s else 6}
+        axes.set_title(textwrap.fill(plot.title, 46), loc="left", **said)
+        axes.set_ylabel(plot.label, fontsize=8)
+        axes.set_xlabel(COSTS["cpu_s_per_s"], fontsize=8)
+    figure.legend(handles=_legend(plots), loc="center right", fontsize=9)
     return figure
 
 
-def _draw_panel(axes: Axes, plot: Plot, cost: Cost) -> None:
+def _note(plots: Sequence[Plot]) -> str:
+    return f"{_KINDS[plots[0].points.kind.iloc[0]]} Lower left is better."
+
+
+def _draw_panel(axes: Axes, plot: Plot, cost: str) -> None:
     """Draw the front and every method's curve; above them its cross and its predicted limit."""
-    front = plot.fronts[cost]
-    axes.plot([x for *_, x in front], [_clipped(e) for _, _, e, _ in front], color=PARETO, lw=9,
-              solid_capstyle="round", zorder=1.5)  # fmt: skip
-    for method, curve in plot.curves.items():
-        axes.plot([c[cost] for *_, c in curve], [_clipped(e) for _, e, _ in curve], **_line(method))
+    front, curves, failed = pareto(plot.points, cost), plot.curves(), failures(plot.points)
+    wide: dict[str, Any] = {"lw": 9, "solid_capstyle": "round", "zorder": 1.5}
+    axes.plot(front[cost], front.error.clip(*_SHOWN), color=PARETO, **wide)
+    for method, curve in curves.items():
+        axes.plot(curve[cost], curve.error.clip(*_SHOWN), **_line(method))
     axes.set(xscale="log", yscale="log")
     axes.margins(x=0.08)
     bottom, top = axes.get_ylim()
@@ -342,37 +299,32 @@ def _draw_panel(axes: Axes, plot: Plot, cost: Cost) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
     if bottom < ROUNDING:
         axes.axhspan(bottom, ROUNDING, color="#f3f3f3", zorder=0)
-        axes.text(0.01, bottom, "rounding: exact", transform=axes.get_yaxis_transform(), fontsize=7,
-                  color="#8a8a8a", va="bottom")  # fmt: skip
-    axes.set_ylim(bottom, top * (top / bottom) ** (0.16 if plot.failures else 0.0))
-    over = axes.get_xaxis_transform()
-    taken: dict[int, int] = {}
-    for method, (_, costs) in plot.failures.items():
-        place = round(4.0 * math.log10(costs[cost]))
-        height = 0.965 - 0.033 * taken.setdefault(place, 0)
-        taken[place] += 1
-        axes.plot(costs[cost], height, "x", ms=8, mew=2, color=colour(method), transform=over)
-    for method, limit_s in plot.limits_s.items():
-        for dt_s, _, costs in plot.curves.get(method, ())[:1]:
-            at = costs[cost] * dt_s / limit_s
-            axes.plot(at, 1.0, "|", ms=13, mew=2, color=colour(method), transform=over,
-                      clip_on=False)  # fmt: skip
-
-
-def _clipped(error: float) -> float:
-    return float(np.clip(error, *_SHOWN))
+        said: dict[str, Any] = {"fontsize": 7, "color": "#8a8a8a", "va": "bottom"}
+        inside = axes.get_yaxis_transform()
+        axes.text(0.01, bottom, "rounding: exact", transform=inside, **said)
+    axes.set_ylim(bottom, top * (top / bottom) ** (0.16 if len(failed) else 0.0))
+    over: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "mew": 2}
+    # Crosses of about one cost are put one below the other.
+    place = (4.0 * np.log10(failed[cost])).round()
+    heights = 0.965 - 0.033 * failed.groupby(place).cumcount()
+    for method, x, height in zip(failed.method, failed[cost], heights, strict=True):
+        axes.plot(x, height, "x", ms=8, color=colour(method), **over)
+    for method in [method for method in curves if method in plot.limits_s]:
+        first = curves[method].iloc[0]
+        x = first[cost] * first.dt_s / plot.limits_s[method]
+        axes.plot(x, 1.0, "|", ms=13, color=colour(method), clip_on=False, **over)
 
 
 def _line(method: str) -> dict[str, Any]:
     """Return how a method's curve is drawn: MuJoCo with discs, ours with open squares."""
-    ours = method.startswith("ours")
+    ours, own = method.startswith("ours"), colour(method)
     return {
-        "color": colour(method),
-        "linestyle": "--" if "pyramidal" in method else "-",
-        "linewidth": 1.3,
+        "color": own,
+        "lw": 1.3,
+        "ls": "--" if "pyramidal" in method else "-",
         "marker": "s" if ours else "o",
-        "markersize": 4.5,
-        "markerfacecolor": "white" if ours else colour(method),
+        "ms": 4.5,
+        "mfc": "white" if ours else own,
         "zorder": 3.0,
     }
 
@@ -399,47 +351,37 @@ def duration(seconds: float) -> str:
 
 def _alike(plot: Plot) -> str:
     """Return a sentence on the methods whose curves cover one another, or nothing."""
-    groups: list[list[str]] = []
-    errors = {name: {dt: error for dt, error, _ in curve} for name, curve in plot.curves.items()}
+    curves = {method: curve.set_index("dt_s").error for method, curve in plot.curves().items()}
     # The rounding of 10^5 steps adds up to more than that of one.
-    exact = [
-        name
-        for name, own in errors.items()
-        if name not in plot.failures and max(own.values(), default=1.0) < 100.0 * ROUNDING
-    ]
-    for method in [name for name in errors if name not in exact]:
-        for group in groups:
-            if _same(errors[group[0]], errors[method]):
-                group.append(method)
-                break
-        else:
-            groups.append([method])
-    sentences = [f"One curve: {', '.join(group)}." for group in groups if len(group) > 1]
+    exact = [method for method, errors in curves.items() if errors.max() < 100.0 * ROUNDING]
+    exact = [method for method in exact if method not in set(failures(plot.points).method)]
+    groups: dict[str, list[str]] = {}
+    for method in [method for method in curves if method not in exact]:
+        like = [first for first in groups if _same(curves[first], curves[method])]
+        groups.setdefault((like or [method])[0], []).append(method)
+    sentences = [f"One curve: {', '.join(group)}." for group in groups.values() if len(group) > 1]
     if exact:
         sentences.append(f"Exact at every time step: {', '.join(exact)}.")
     return " ".join(sentences)
 
 
-def _same(one: Mapping[float, float], other: Mapping[float, float]) -> bool:
-    """Say whether two curves are one to the eye: within 1 % at every time step."""
-    shared = one.keys() & other.keys()
-    return bool(shared) and all(
-        abs(one[dt] - other[dt]) <= 0.01 * one[dt] + ROUNDING for dt in shared
-    )
+def _same(one: Any, other: Any) -> bool:
+    """Say whether two series by time step are one to the eye: within 1 % wherever both are."""
+    one, other = one.align(other, join="inner")
+    return len(one) > 0 and bool(((one - other).abs() <= 0.01 * one + ROUNDING).all())
 
 
 def _legend(plots: Sequence[Plot]) -> list[Line2D]:
     """Return the legend's entries: the methods by family, the front, the cross and the limit."""
-    methods = dict.fromkeys(method for plot in plots for method in plot.curves)
+    methods = dict.fromkeys(method for plot in plots for method in plot.curves())
     entries: list[Line2D] = []
     for family, title in (("MuJoCo ", "MuJoCo, in C"), ("ours ", "ours, compiled by Numba")):
         own = [method for method in methods if method.startswith(family)]
-        if own:
-            entries.append(Line2D([], [], linestyle="none", label=title))
-            entries += [Line2D([], [], label=m.removeprefix(family), **_line(m)) for m in own]
+        entries += [Line2D([], [], ls="", label=title)] if own else []
+        entries += [Line2D([], [], label=m.removeprefix(family), **_line(m)) for m in own]
     entries.append(Line2D([], [], color=PARETO, lw=9, label="Pareto front: none is better"))
-    dark: dict[str, Any] = {"color": PREDICTION, "linestyle": "none", "markeredgewidth": 2}
-    if any(plot.failures for plot in plots):
+    dark: dict[str, Any] = {"color": PREDICTION, "ls": "", "mew": 2}
+    if any(len(failures(plot.points)) for plot in plots):
         entries.append(Line2D([], [], marker="x", ms=8, label="first to fail", **dark))
     if any(plot.limits_s for plot in plots):
         entries.append(Line2D([], [], marker="|", ms=13, label="predicted to blow up", **dark))

@@ -20,11 +20,11 @@ from roller_env.units import quants
 LOST: Final = 1e6
 """No number of a ball in the game is so large, m, m/s or rad/s."""
 
+# The original's ball, gravity and friction: its docs are in `roller_env.level.schema`.
 RADIUS_M: Final = quants(16.0)
 MASS_KG: Final = 1.0
 GRAVITY_M_S2: Final = quants(386.0)
 FRICTION: Final = 0.3
-"""The game's ball, gravity and friction: docs of the original, in `roller_env.level.schema`."""
 
 DECK_M: Final = quants(16.0)
 """Thickness of the original's decks."""
@@ -33,11 +33,9 @@ THROUGH_M: Final = RADIUS_M + DECK_M / 2
 
 GATE_SPEED_M_S: Final = quants(32.0)
 PLATE_SPEED_M_S: Final = quants(1.6)
-"""The original's gates and plates."""
-
 LIFT_N: Final = quants(500.0)
 LIFT_S: Final = 5.0
-"""The original's lift pad on its ball, and for how long."""
+"""Of the original's gates, plates and lift pads; how long a pad lifts."""
 
 TUBE_FALL_M: Final = 46.9
 """The highest that a pad and a tube of the classic level throw the ball over a deck."""
@@ -59,23 +57,14 @@ def make_level(**pieces: Any) -> Level:
 
 @dataclass(frozen=True)
 class Course:
-    """A compiled level and where its ball begins.
-
-    Attributes:
-        compiled: the level.
-        at: of the ball's centre, m.
-        velocity: of the ball, m/s.
-        spin: rad/s, world frame.
-        force_n: held on the ball, N.
-        movers_m_s: velocity of every plate and gate, m/s, up positive.
-    """
+    """A compiled level and where its ball begins."""
 
     compiled: CompiledLevel
-    at: Sequence[float]
-    velocity: Sequence[float] = (0.0, 0.0, 0.0)
-    spin: Sequence[float] = (0.0, 0.0, 0.0)
-    force_n: Sequence[float] = (0.0, 0.0, 0.0)
-    movers_m_s: float = 0.0
+    at: Sequence[float]  # the ball's centre, m
+    velocity: Sequence[float] = (0.0, 0.0, 0.0)  # m/s
+    spin: Sequence[float] = (0.0, 0.0, 0.0)  # rad/s, world frame
+    force_n: Sequence[float] = (0.0, 0.0, 0.0)  # held on the ball
+    movers_m_s: float = 0.0  # of every plate and gate, up positive
 
     def prepare(self, data: mujoco.MjData) -> None:
         """Put ``data`` to the beginning."""
@@ -96,22 +85,13 @@ class Course:
 
 @dataclass(frozen=True)
 class Run:
-    """What the ball did.
+    """What the ball did."""
 
-    Attributes:
-        time_s: (n,).
-        position: (n, 3) m.
-        velocity: (n, 3) m/s.
-        energy: (n,) J for each kg: of motion, of spin and of height, less the held force's work.
-        depth: (n,) of the deepest contact, m; 0 in the air.
-        finite: whether all of it is.
-    """
-
-    time_s: Float64
-    position: Float64
-    velocity: Float64
-    energy: Float64
-    depth: Float64
+    time_s: Float64  # (n,)
+    position: Float64  # (n, 3) m
+    velocity: Float64  # (n, 3) m/s
+    energy: Float64  # (n,) J a kg: of motion, spin and height, less the held force's work
+    depth: Float64  # (n,) of the deepest contact, m; 0 in the air
     finite: bool
 
     @property
@@ -159,12 +139,7 @@ def play(course: Course, seconds: float) -> Run:
 def played(
     config: EnvConfig, keys: Sequence[tuple[str, float]], seed: int
 ) -> tuple[Float64, Float64]:
-    """Play keys through the product's own simulation, rules and all.
-
-    Args:
-        config: of the game.
-        keys: of ``wasd``, and for how many seconds each are held.
-        seed: by which the ball's place at the start is drawn.
+    """Play keys of ``wasd``, each for some seconds, through the product's own simulation.
 
     Returns:
         Where the ball began, (3,) m, and what the actuators did in each control step, (steps, nu),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 import mujoco
 
@@ -13,18 +13,6 @@ from roller_env.rigid_body import INTEGRATORS, Integrator
 
 MujocoIntegrator = Literal["Euler", "implicit", "implicitfast", "discrete", "RK4"]
 Cone = Literal["elliptic", "pyramidal"]
-
-_INTEGRATORS: Final[dict[MujocoIntegrator, mujoco.mjtIntegrator]] = {
-    "Euler": mujoco.mjtIntegrator.mjINT_EULER,
-    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
-    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
-    "discrete": mujoco.mjtIntegrator.mjINT_DISCRETE,
-    "RK4": mujoco.mjtIntegrator.mjINT_RK4,
-}
-_CONES: Final[dict[Cone, mujoco.mjtCone]] = {
-    "elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC,
-    "pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +45,8 @@ class MujocoMethod:
         default: an experiment has to see it. The constraint Jacobian is dense since the sparse
         path of MuJoCo 4.0.0 has a wrong Hessian (its changelog, 4.0.1).
         """
-        spec.option.integrator = _INTEGRATORS[self.integrator]
-        spec.option.cone = _CONES[self.cone]
+        spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{self.integrator.upper()}")
+        spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{self.cone.upper()}")
         spec.option.timestep = dt_s
         spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         if self.integrator == "discrete":
@@ -91,7 +79,7 @@ class RigidBodyMethod:
 
 Method = MujocoMethod | RigidBodyMethod
 
-MUJOCO: Final = tuple(MujocoMethod(integrator) for integrator in _INTEGRATORS)
+MUJOCO: Final = tuple(MujocoMethod(integrator) for integrator in get_args(MujocoIntegrator))
 """Every integrator of MuJoCo with the elliptic cone, which bends no heading."""
 
 PYRAMIDAL: Final = tuple(

@@ -1,10 +1,10 @@
 """The parallel cube: the report's rigid body and MuJoCo's free joint through the same flights.
 
 Both get the same mass, inertia, start, gravity, keys, lift, damping and torque, and are compared
-with one another and with a **reference**, over time. The reference is a closed form of
-`roller_env.rigid_body.exact` for the linear motion and for every free rotation, and
-`exact.reference` for the rotations under damping or torque; it was compared with a Taylor series in
-40 digits that shares no code with it.
+with one another and with a **reference**, over time: `roller_env.lab.free.FreeScene.truth`, a
+closed form for the linear motion and for every free rotation, and an integration for the rotations
+under damping or torque; it was compared with a Taylor series in 40 digits that shares no code with
+it.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,22 +21,17 @@ from matplotlib.figure import Figure
 from pandas import concat
 
 from roller_env.lab import chart
-from roller_env.lab.free import Acting, FreeScene, Truth, Vector, in_rows
+from roller_env.lab.free import Acting, FreeScene, Vector
 from roller_env.lab.game import GRAVITY_M_S2, LIFT_N, LIFT_S
 from roller_env.lab.methods import Method, MujocoMethod, RigidBodyMethod
 from roller_env.lab.runner import known
-from roller_env.lab.table import Frame, frame, markdown
+from roller_env.lab.table import Frame, markdown
 from roller_env.rigid_body import (
-    LIE_RK4,
-    RK4,
-    RK4_BODY,
-    SPLITTING4,
+    INTEGRATORS,
     Body,
     Integrator,
     PiecewiseConstantForce,
     State,
-    driving_torque,
-    exact,
     key_sequence,
     quaternion,
 )
@@ -45,9 +40,10 @@ from roller_env.rigid_body.arrays import Float64, positive_time
 AGREEMENT: Final = 1e-9
 """The two sides agree when position, m, and attitude, rad, stay within this of one another."""
 
-REFERENCE_ERROR: Final[Mapping[str, float]] = {"position_m": 5e-13, "attitude_rad": 5e-13}
-"""What the reference itself may be wrong by in 10 s. Measured against 40 digits: 2.2e-13 rad for
-the thrown box, whose closed form is next to its separatrix, and at most 1.3e-13 rad else."""
+REFERENCE_ERROR: Final = 5e-13
+"""What the reference's position, m, and attitude, rad, may be wrong by in 10 s. Measured against 40
+digits: 2.2e-13 rad for the thrown box, whose closed form is next to its separatrix, and at most
+1.3e-13 rad else."""
 
 MOMENTS: Final = 100
 """At most so many moments of a flight are compared; the last step always is."""
@@ -55,7 +51,6 @@ MOMENTS: Final = 100
 # --- what is flown ---------------------------------------------------------------------------
 
 WEIGHT_M_S2: Final[Vector] = (0.0, 0.0, -GRAVITY_M_S2)
-
 
 START_ORIENTATION: Final = (0.8, 0.2, -0.4, 0.4)
 """A unit quaternion with no special direction, so that no axis hides another."""
@@ -67,34 +62,14 @@ BODIES: Final[Mapping[str, Body]] = {
 """The report's cube, and the slender box of the free-body benchmark (scpeters/benchmark)."""
 
 
-FREE: Final = Acting()
-
-
 @dataclass(frozen=True)
 class Flight:
-    """How a flight begins, and what acts.
-
-    Attributes:
-        title: what people read.
-        velocity_m_s: at the start, world axes.
-        spin_rad_s: angular velocity at the start, **body** axes: that is where a box's axes differ.
-        acting: forces and torques.
-    """
+    """How a flight begins, and what acts."""
 
     title: str
-    velocity_m_s: Vector
-    spin_rad_s: Vector
-    acting: Acting = FREE
-
-    def start(self, body: Body) -> State:
-        """Return the state in which ``body``, one of `BODIES`, begins."""
-        q = np.array([START_ORIENTATION])
-        return State.create(
-            body,
-            orientation=START_ORIENTATION,
-            velocity=self.velocity_m_s,
-            angular_velocity=quaternion.rotate(q, np.array([self.spin_rad_s])),
-        )
+    velocity_m_s: Vector  # world axes
+    spin_rad_s: Vector  # **body** axes: that is where a box's axes differ
+    acting: Acting
 
 
 KEYS_HELD: Final = ((0.0, "W"), (1.0, "WA"), (2.5, "A"), (4.0, "SD"), (6.5, "D"), (8.0, ""))
@@ -103,32 +78,27 @@ KEYS_HELD: Final = ((0.0, "W"), (1.0, "WA"), (2.5, "A"), (4.0, "SD"), (6.5, "D")
 _LIFT: Final = PiecewiseConstantForce(
     np.array([0.0, LIFT_S]), np.array([(0.0, 0.0, LIFT_N), (0.0, 0.0, 0.0)])
 )
+_WEIGHT: Final = Acting(WEIGHT_M_S2)
 
 FLIGHTS: Final[Mapping[str, Flight]] = {
-    "drift": Flight("drift and spin, no gravity", (-0.9, 0.4, 0.1), (3.0, -5.0, 2.0)),
+    "drift": Flight("drift and spin, no gravity", (-0.9, 0.4, 0.1), (3.0, -5.0, 2.0), Acting()),
     "ballistic": Flight(
-        "thrown, spun about the box's middle axis",
-        (-2.0, 2.0, 8.0),
-        (0.1, 5.0, 0.1),
-        Acting(WEIGHT_M_S2),
+        "thrown, spun about the box's middle axis", (-2.0, 2.0, 8.0), (0.1, 5.0, 0.1), _WEIGHT
     ),
     "keys": Flight(
         "WASD key sequence in free fall",
         (0.0, 0.0, 5.0),
         (2.0, 3.0, -4.0),
-        Acting(WEIGHT_M_S2, held=key_sequence(KEYS_HELD)),
+        replace(_WEIGHT, held=key_sequence(KEYS_HELD)),
     ),
     "lift": Flight(
-        "lift of 12.7 N for 5 s",
-        (0.5, 0.0, 0.0),
-        (-3.0, 1.0, 5.0),
-        Acting(WEIGHT_M_S2, held=_LIFT),
+        "lift of 12.7 N for 5 s", (0.5, 0.0, 0.0), (-3.0, 1.0, 5.0), replace(_WEIGHT, held=_LIFT)
     ),
     "damping": Flight(
         "linear and angular damping",
         (5.0, -3.0, 10.0),
         (4.0, -4.0, 3.0),
-        Acting(WEIGHT_M_S2, drag_n_s_m=0.5, spin_damping_nm_s=0.05),
+        replace(_WEIGHT, drag_n_s_m=0.5, spin_damping_nm_s=0.05),
     ),
     "torque": Flight(
         "the report's torque, (1, 0, 0) - 0.1 omega",
@@ -164,29 +134,21 @@ def parsed_keys(events: Iterable[str]) -> PiecewiseConstantForce:
 class Settings:
     """What to compare.
 
-    Attributes:
-        bodies: names in `BODIES`.
-        flights: by name.
-        ours: a method of ours.
-        mujoco: a method of MuJoCo's.
-        dt_s: step of both, s.
-        duration_s: of every flight, s.
-
     Raises:
         ValueError: when a flight or the time between two jumps is no whole number of steps.
     """
 
-    bodies: tuple[str, ...]
+    bodies: tuple[str, ...]  # names in `BODIES`
     flights: Mapping[str, Flight]
     ours: Integrator
     mujoco: MujocoMethod
-    dt_s: float
-    duration_s: float
+    dt_s: float  # of both
+    duration_s: float  # of every flight
 
     def __post_init__(self) -> None:
         positive_time("dt", self.dt_s)
         positive_time("duration", self.duration_s)
-        for what, time_s in self._boundaries():
+        for time_s, what in self._ends().items():
             steps = time_s / self.dt_s
             if not _whole(steps):
                 raise ValueError(
@@ -194,85 +156,41 @@ class Settings:
                     f"to be a whole number of them; {time_s / math.ceil(steps):.9g} s would do"
                 )
 
-    def _boundaries(self) -> list[tuple[str, float]]:
-        """Return the times at which a step has to end, with what happens then."""
-        jumps = [
-            (f"the scene {name!r} changes its force at", float(t))
+    def _ends(self) -> dict[float, str]:
+        """Return the times at which a step has to end, s, with what happens then."""
+        return {self.duration_s: "a flight ends at"} | {
+            float(t): f"the scene {name!r} changes its force at"
             for name, flight in self.flights.items()
             for t in flight.acting.jumps_s
-        ]
-        return [("a flight ends at", self.duration_s), *jumps]
+        }
 
     def steps_s(self) -> list[float]:
         """Return the steps at which other methods are tried, largest first: those that fit."""
-        times = [time_s for _, time_s in self._boundaries()]
         tried = [factor * self.dt_s for factor in (4.0, 2.0, 1.0, 0.5)]
-        return [dt for dt in tried if all(_whole(time_s / dt) for time_s in times)]
+        return [dt for dt in tried if all(_whole(time_s / dt) for time_s in self._ends())]
 
     def scene(self, body: str, name: str, dt_s: float) -> FreeScene:
         """Return a flight of a body as a scene whose moments a step of ``dt_s`` divides."""
-        flight = self.flights[name]
-        steps = round(self.duration_s / dt_s)
-        moments = max(n for n in range(1, MOMENTS + 1) if steps % n == 0)
+        flight, steps = self.flights[name], round(self.duration_s / dt_s)
+        q = np.array([START_ORIENTATION])
+        spin = quaternion.rotate(q, np.array([flight.spin_rad_s]))
         return FreeScene(
             name=name,
             title=flight.title,
-            start=flight.start(BODIES[body]),
-            exact=_truth(flight.acting),
+            start=State.create(
+                BODIES[body], orientation=q, velocity=flight.velocity_m_s, angular_velocity=spin
+            ),
             quantities=(),
             time_steps_s=(),
             acting=flight.acting,
             horizon_s=self.duration_s,
-            moments=moments,
+            moments=max(n for n in range(1, MOMENTS + 1) if steps % n == 0),
         )
 
 
 def _whole(steps: float) -> bool:
     # 0.3 / 0.1 is not 3.
     return abs(steps - round(steps)) <= 1e-6
-
-
-def _truth(acting: Acting) -> Truth:
-    """Return the true motion at rising times."""
-
-    def truth(many: State, times_s: Float64) -> State:
-        start = many.take([0])
-        if acting.spin_damping_nm_s or any(acting.torque_nm):
-            turned = _turned(acting, start, times_s)
-        elif start.body.isotropic:
-            turned = exact.constant_spin(many, times_s)
-        else:
-            turned = exact.asymmetric_top(many, times_s)
-        moved = _moved(acting, start, times_s)
-        return turned.recalculate(position=moved.position, momentum=moved.momentum)
-
-    return truth
-
-
-def _turned(acting: Acting, start: State, times_s: Float64) -> State:
-    """Return the rotation under torque and damping, integrated from each moment to the next."""
-    load = driving_torque(acting.torque_nm, acting.spin_damping_nm_s)
-    states = [start]
-    for begin, end in itertools.pairwise([0.0, *times_s.tolist()]):
-        states.append(exact.reference(states[-1], end - begin, load, start_s=begin))
-    return in_rows(states[1:])
-
-
-def _moved(acting: Acting, start: State, times_s: Float64) -> State:
-    """Return the linear motion, a closed form between the jumps of the held force."""
-    end = float(times_s[-1])
-    jumps = [float(t) for t in acting.jumps_s if 0.0 < t < end]
-    weight = start.body.mass[0] * np.array(acting.gravity_m_s2)
-    pieces: list[State] = []
-    for begin, stop in itertools.pairwise([0.0, *jumps, end]):
-        within = times_s[(times_s > begin) & (times_s <= stop)]
-        passed = np.append(within, stop) - begin
-        held = 0.0 if acting.held is None else acting.held.force_at_time(begin)
-        many = start.take([0] * len(passed))
-        reached = exact.linear_drag(many, passed, acting.drag_n_s_m, weight + held)
-        pieces += [reached.take([row]) for row in range(len(within))]
-        start = reached.take([-1])
-    return in_rows(pieces)
 
 
 # --- how far apart ---------------------------------------------------------------------------
@@ -286,14 +204,12 @@ QUANTITIES: Final[Mapping[str, str]] = {
 }
 """The columns of `apart`, with what people read."""
 
-PAIRS: Final = ("ours - MuJoCo", "ours - reference", "MuJoCo - reference")
-
 
 def flown(scene: FreeScene, method: Method, dt_s: float) -> State:
     """Return a flight's moments as rows."""
     trial = scene.trial(method, dt_s)
     trial.run()
-    return trial.reached()
+    return trial.reached
 
 
 def apart(a: State, b: State, gravity_m_s2: Vector) -> dict[str, Float64]:
@@ -322,70 +238,58 @@ def compare(settings: Settings, body: str) -> tuple[Frame, Frame]:
         `QUANTITIES` of ours from MuJoCo, both sides' errors of position and attitude, and the
         verdict in words. And the differences over time: body, scene, pair, time_s, `QUANTITIES`.
     """
-    verdicts, samples = [], []
+    samples = []
     for name, flight in settings.flights.items():
         scene = settings.scene(body, name, settings.dt_s)
-        mine = flown(scene, RigidBodyMethod(settings.ours), settings.dt_s)
-        theirs = flown(scene, settings.mujoco, settings.dt_s)
-        motions = ((mine, theirs), (mine, scene.truth), (theirs, scene.truth))
-        gravity = flight.acting.gravity_m_s2
-        found = {pair: apart(*two, gravity) for pair, two in zip(PAIRS, motions, strict=True)}
-        largest = {
-            pair: {what: float(values.max()) for what, values in of_pair.items()}
-            for pair, of_pair in found.items()
+        motions = {
+            "ours": flown(scene, RigidBodyMethod(settings.ours), settings.dt_s),
+            "MuJoCo": flown(scene, settings.mujoco, settings.dt_s),
+            "reference": scene.truth,
         }
-        verdicts.append(_verdict(settings, body, name, largest))
-        for pair, of_pair in found.items():
-            rows = Frame({"time_s": scene.times_s, **of_pair})
-            rows.insert(0, "pair", pair)
-            rows.insert(0, "scene", name)
-            rows.insert(0, "body", body)
-            samples.append(rows)
-    return frame(verdicts), concat(samples, ignore_index=True)
-
-
-def _verdict(
-    settings: Settings, body: str, scene: str, largest: Mapping[str, Mapping[str, float]]
-) -> dict[str, object]:
-    between, mine, theirs = (largest[pair] for pair in PAIRS)
-    return {
-        "body": body,
-        "scene": scene,
-        "ours": f"ours {settings.ours.name}",
-        "mujoco": settings.mujoco.name,
-        "dt_s": settings.dt_s,
-        "duration_s": settings.duration_s,
-        **between,
-        "ours_position_error_m": mine["position_m"],
-        "ours_attitude_error_rad": mine["attitude_rad"],
-        "mujoco_position_error_m": theirs["position_m"],
-        "mujoco_attitude_error_rad": theirs["attitude_rad"],
-        "verdict": _words(settings, between, mine, theirs),
-    }
-
-
-def _words(
-    settings: Settings,
-    between: Mapping[str, float],
-    mine: Mapping[str, float],
-    theirs: Mapping[str, float],
-) -> str:
-    """Return ``agree``, or which side is further from the truth, by what and how much."""
-    what, unit = (
-        ("attitude_rad", "rad") if between["position_m"] <= AGREEMENT else ("position_m", "m")
+        for a, b in itertools.combinations(motions, 2):
+            where = {"body": body, "scene": name, "pair": f"{a} - {b}", "time_s": scene.times_s}
+            found = apart(motions[a], motions[b], flight.acting.gravity_m_s2)
+            samples.append(Frame(where | found))
+    every = concat(samples, ignore_index=True)
+    largest = every.groupby(["pair", "scene"], sort=False)[list(QUANTITIES)].max()
+    between, mine, theirs = (
+        largest.loc[pair] for pair in ("ours - MuJoCo", "ours - reference", "MuJoCo - reference")
     )
-    if max(between["position_m"], between["attitude_rad"]) <= AGREEMENT:
+    verdicts = Frame(
+        {
+            "body": body,
+            "scene": between.index,
+            "ours": f"ours {settings.ours.name}",
+            "mujoco": settings.mujoco.name,
+            "dt_s": settings.dt_s,
+            "duration_s": settings.duration_s,
+            **between,
+            "ours_position_error_m": mine.position_m,
+            "ours_attitude_error_rad": mine.attitude_rad,
+            "mujoco_position_error_m": theirs.position_m,
+            "mujoco_attitude_error_rad": theirs.attitude_rad,
+        }
+    )
+    verdicts["verdict"] = [_verdict(row) for row in verdicts.itertuples()]
+    return verdicts.reset_index(drop=True), every
+
+
+def _verdict(row: Any) -> str:
+    """Return ``agree``, or which side is further from the truth, by what and how much."""
+    if max(row.position_m, row.attitude_rad) <= AGREEMENT:
         return "agree"
-    sides = {f"ours {settings.ours.name}": mine[what], settings.mujoco.name: theirs[what]}
+    unit = "rad" if row.position_m <= AGREEMENT else "m"
+    what = "attitude_error_rad" if unit == "rad" else "position_error_m"
+    sides = {row.ours: getattr(row, f"ours_{what}"), row.mujoco: getattr(row, f"mujoco_{what}")}
     right, wrong = sorted(sides, key=sides.__getitem__)
     return f"{wrong} is off by {sides[wrong]:.1e} {unit}, {right} by {sides[right]:.1e}"
 
 
-REMEDIES: Final[Mapping[str, tuple[Integrator, str]]] = {
-    "rk4": (RK4, "the report's: momentum, world axes"),
-    "lie_rk4": (LIE_RK4, "turns instead of sums of quaternions"),
-    "rk4_body": (RK4_BODY, "body axes instead of world axes"),
-    "splitting4": (SPLITTING4, "exact turns about body axes"),
+REMEDIES: Final[Mapping[str, str]] = {
+    "rk4": "the report's: momentum, world axes",
+    "lie_rk4": "turns instead of sums of quaternions",
+    "rk4_body": "body axes instead of world axes",
+    "splitting4": "exact turns about body axes",
 }
 """The report's method and what could mend it, each with the one thing that it exchanges."""
 
@@ -396,28 +300,20 @@ def remedies(settings: Settings, body: str) -> Iterator[Frame]:
     Columns: body, scene, method, dt_s, against_mujoco_rad, error_rad, mujoco_error_rad; the
     largest angles of a flight.
     """
-    methods = {settings.ours.name: settings.ours}
-    methods |= {name: method for name, (method, _) in REMEDIES.items()}
-    steps_s = settings.steps_s()
-    for dt_s in steps_s:
+    methods = {settings.ours.name: settings.ours} | {name: INTEGRATORS[name] for name in REMEDIES}
+    for dt_s in settings.steps_s():
         rows = []
         for name in settings.flights:
-            scene = settings.scene(body, name, steps_s[0])
+            scene = settings.scene(body, name, settings.steps_s()[0])
             theirs = flown(scene, settings.mujoco, dt_s)
-            for method in methods.values():
-                mine = flown(scene, RigidBodyMethod(method), dt_s)
-                rows.append(
-                    {
-                        "body": body,
-                        "scene": name,
-                        "method": method.name,
-                        "dt_s": dt_s,
-                        "against_mujoco_rad": _angle(mine, theirs),
-                        "error_rad": _angle(mine, scene.truth),
-                        "mujoco_error_rad": _angle(theirs, scene.truth),
-                    }
-                )
-        yield frame(rows)
+            for method, ours in methods.items():
+                mine = flown(scene, RigidBodyMethod(ours), dt_s)
+                row = {"body": body, "scene": name, "method": method, "dt_s": dt_s}
+                row["against_mujoco_rad"] = _angle(mine, theirs)
+                row["error_rad"] = _angle(mine, scene.truth)
+                row["mujoco_error_rad"] = _angle(theirs, scene.truth)
+                rows.append(row)
+        yield Frame(rows)
 
 
 def _angle(a: State, b: State) -> float:
@@ -427,108 +323,87 @@ def _angle(a: State, b: State) -> float:
 def verdict_table(verdicts: Frame) -> str:
     """Return the largest differences and who is wrong, for people, as Markdown."""
     columns = ["body", "scene", *QUANTITIES, "verdict"]
-    titles = ["body", "scene", *QUANTITIES.values(), "verdict"]
-    return markdown(titles, verdicts[columns].values.tolist())
+    return markdown(verdicts[columns].rename(columns=QUANTITIES))
 
 
 def remedy_table(rows: Frame) -> str:
     """Return the largest attitude differences from MuJoCo, rad, by method and step, as Markdown."""
-    wide = rows.pivot_table("against_mujoco_rad", ["method", "dt_s"], "scene", sort=False)
-    wide = wide.sort_index(level="dt_s", ascending=False, sort_remaining=False)
-    cells = [[name, 1e3 * dt, *apart] for (name, dt), apart in wide.T.to_dict("list").items()]
-    return markdown(["ours", "dt, ms", *(f"{scene}, rad" for scene in wide.columns)], cells)
+    rows = rows.assign(ours=rows.method, ms=1e3 * rows.dt_s, scene=rows.scene + ", rad")
+    wide = rows.pivot_table("against_mujoco_rad", ["ours", "ms"], "scene", sort=False)
+    wide = wide.sort_index(level="ms", ascending=False, sort_remaining=False)
+    return markdown(wide.reset_index().rename(columns={"ms": "dt, ms"}))
 
 
 # --- pictures --------------------------------------------------------------------------------
 
 _FLOOR: Final = 1e-17
 """Differences below this, nearly always exactly 0, leave the picture."""
+_MARGINS: Final = (0.9, 0.5, 1.0, 1.0)
 
 
+@chart.styled
 def draw_flights(settings: Settings, body: str, samples: Frame) -> Figure:
     """Draw the differences over time: a row for each scene, a panel for each quantity."""
-    figure, panels = chart.grid(
-        (len(settings.flights), len(QUANTITIES)),
-        f"The {body} in parallel: {settings.mujoco.name} and our {settings.ours.name}, "
-        f"dt {1e3 * settings.dt_s:g} ms",
+    ours, theirs = f"ours {settings.ours.name}", settings.mujoco.name
+    title = f"The {body} in parallel: {theirs} and our {ours[5:]}, dt {1e3 * settings.dt_s:g} ms"
+    note = (
         "Thick: how far each side is from the reference. Thin: how far they are from one another; "
-        "where a line is missing, it is 0 (under 1e-17).",
-        panel=(3.0, 2.1),
-        sharey="col",
+        "where a line is missing, it is 0 (under 1e-17)."
     )
+    shape, size = (len(settings.flights), len(QUANTITIES)), (3.0, 2.1)
+    figure, panels = chart.grid(shape, title, note, panel=size, margins=_MARGINS, sharey="col")
     lines = (
-        ("ours - reference", "our own error", chart.colour(f"ours {settings.ours.name}"), 3.6),
-        ("MuJoCo - reference", "MuJoCo's own error", chart.colour(settings.mujoco.name), 3.6),
-        ("ours - MuJoCo", "difference between the two", "#222222", 1.1),
+        ("ours - reference", "our own error", chart.colour(ours), 3.6, 0.7),
+        ("MuJoCo - reference", "MuJoCo's own error", chart.colour(theirs), 3.6, 0.7),
+        ("ours - MuJoCo", "difference between the two", "#222222", 1.1, 1.0),
     )
-    for row, name in zip(panels, settings.flights, strict=True):
-        mine = samples[samples.scene == name]
-        for axes, what in zip(row, QUANTITIES, strict=True):
-            if what in REFERENCE_ERROR:
-                axes.axhspan(_FLOOR, REFERENCE_ERROR[what], color="#efefef", lw=0)
-                axes.axhline(AGREEMENT, color="#555555", lw=1.0, ls="--", label="agree to 1e-9")
-            for pair, label, colour, width in lines:
-                one = mine[mine.pair == pair]
+    for row, (name, flight) in zip(panels, settings.flights.items(), strict=True):
+        row[0].set_ylabel(flight.title, fontsize=8)
+        for axes, (what, said) in zip(row, QUANTITIES.items(), strict=True):
+            if what in ("position_m", "attitude_rad"):
+                axes.axhspan(_FLOOR, REFERENCE_ERROR, color="#efefef", lw=0)
+                _draw_agreement(axes)
+            for pair, label, colour, width, alpha in lines:
+                one = samples[(samples.scene == name) & (samples.pair == pair)]
                 shown = one[what].where(one[what] > _FLOOR)
-                alpha = 0.7 if width > 2.0 else 1.0
                 axes.plot(one.time_s, shown, color=colour, lw=width, alpha=alpha, label=label)
             axes.set(yscale="log", xlim=(0.0, settings.duration_s))
-            axes.set_title(QUANTITIES[what], fontsize=9, color="#555555", loc="left")
-        row[0].set_ylabel(settings.flights[name].title, fontsize=8)
+            axes.set_title(said, fontsize=9, color="#555555", loc="left")
     chart.legend_of(figure, panels[0, 1])
     return figure
 
 
+def _draw_agreement(axes: Axes) -> None:
+    axes.axhline(AGREEMENT, color="#555555", lw=1.0, ls="--", label="agree to 1e-9")
+
+
+@chart.styled
 def draw_remedies(settings: Settings, body: str, rows: Frame) -> Figure:
     """Draw the attitude error against the time step: a panel for each scene, a line a method."""
-    columns = min(3, len(settings.flights))
-    figure, panels = chart.grid(
-        (math.ceil(len(settings.flights) / columns), columns),
-        f"The {body}: which part of the report's method makes its error",
-        f"largest attitude error in {settings.duration_s:g} s, rad, against the time step, ms",
-        panel=(4.6, 3.2),
-        sharey="all",
-    )
-    for axes, name in itertools.zip_longest(panels.ravel(), settings.flights):
-        if name is None:
-            axes.set_visible(False)
-            continue
-        _draw_remedies_of(axes, settings, rows[rows.scene == name])
-        axes.set_title(settings.flights[name].title, fontsize=10, loc="left")
+    title = f"The {body}: which part of the report's method makes its error"
+    note = f"largest attitude error in {settings.duration_s:g} s, rad, against the time step, ms"
+    columns, mujoco = min(3, len(settings.flights)), settings.mujoco.name
+    shape, size = (math.ceil(len(settings.flights) / columns), columns), (4.6, 3.2)
+    figure, panels = chart.grid(shape, title, note, panel=size, margins=_MARGINS, sharey="all")
+    for axes in panels.ravel()[len(settings.flights) :]:
+        axes.set_visible(False)
+    for axes, (name, flight) in zip(panels.ravel(), settings.flights.items(), strict=False):
+        own = rows[rows.scene == name].assign(ms=1e3 * rows.dt_s)
+        wide = own.pivot_table("error_rad", "ms", "method", sort=False)
+        thick = own.groupby("ms").mujoco_error_rad.first()
+        axes.plot(thick, lw=5, alpha=0.5, color=chart.colour(mujoco), label=mujoco)
+        for method in wide:
+            label = f"{method}: {REMEDIES[method]}" if method in REMEDIES else method
+            axes.plot(wide[method], "o-", ms=4, color=chart.colour(f"ours {method}"), label=label)
+        _draw_agreement(axes)
+        axes.set(xscale="log", yscale="log")
+        axes.set_xticks(wide.index, [f"{ms:g}" for ms in wide.index])
+        axes.minorticks_off()
+        axes.set_title(flight.title, fontsize=10, loc="left")
     chart.legend_of(figure, panels[0, 0])
     return figure
 
 
-def _draw_remedies_of(axes: Axes, settings: Settings, rows: Frame) -> None:
-    theirs, name = rows.drop_duplicates("dt_s"), settings.mujoco.name
-    axes.plot(
-        1e3 * theirs.dt_s,
-        theirs.mujoco_error_rad,
-        color=chart.colour(name),
-        lw=5,
-        alpha=0.5,
-        label=name,
-    )
-    for method, mine in rows.groupby("method", sort=False):
-        label = f"{method}: {REMEDIES[method][1]}" if method in REMEDIES else method
-        axes.plot(
-            1e3 * mine.dt_s,
-            mine.error_rad,
-            "o-",
-            ms=4,
-            color=chart.colour(f"ours {method}"),
-            label=label,
-        )
-    axes.axhline(AGREEMENT, color="#555555", lw=1.0, ls="--", label="agree to 1e-9")
-    axes.set(xscale="log", yscale="log")
-    axes.set_xticks(1e3 * theirs.dt_s, [f"{1e3 * dt:g}" for dt in theirs.dt_s])
-    axes.minorticks_off()
-
-
 def chosen(what: str, name: str, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the name asked for, or every name for ``all``.
-
-    Raises:
-        ValueError: there is no such name; with the nearest.
-    """
+    """Return the name asked for, or every name for ``all``; a ValueError names the nearest."""
     return tuple(names) if name == "all" else (known(what, name, [*names, "all"]),)

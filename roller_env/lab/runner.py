@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import platform
-import statistics
 import sys
 import time
 from abc import ABC, abstractmethod
@@ -20,37 +19,17 @@ from difflib import get_close_matches
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import numpy as np
+from pandas import DataFrame as Frame
 
 from roller_env import __version__
 
+Name = TypeVar("Name")
+
 REPEATS: Final = 7
 """Repetitions of which the median is taken."""
-
-
-@dataclass(frozen=True, slots=True)
-class Median:
-    """A median over rounds, with the smallest and the largest."""
-
-    value: float
-    low: float
-    high: float
-
-    @staticmethod
-    def of(values: Sequence[float]) -> Median:
-        """Return the median of at least one value."""
-        return Median(statistics.median(values), min(values), max(values))
-
-    @property
-    def spread(self) -> float:
-        """(largest - smallest) / median: how far the machine can be believed."""
-        return (self.high - self.low) / self.value
-
-    def times(self, factor: float) -> Median:
-        """Return it in another unit."""
-        return Median(self.value * factor, self.low * factor, self.high * factor)
 
 
 def timed(work: Callable[[], object], clock: Callable[[], float] = time.perf_counter) -> float:
@@ -60,24 +39,23 @@ def timed(work: Callable[[], object], clock: Callable[[], float] = time.perf_cou
     return clock() - start
 
 
-def cpu_time(work: Callable[[], object], repeats: int = REPEATS) -> Median:
+def cpu_seconds(work: Callable[[], object], repeats: int = REPEATS) -> list[float]:
     """Do ``work`` once to warm the caches and then ``repeats`` times; return CPU seconds.
 
-    They are this thread's own: of work in one thread, on a quiet machine, the wall time, and on a
-    busy one still the work's.
-
-    Raises:
-        ValueError: fewer repetitions than one.
+    They are this thread's own: on a busy machine still the work's.
     """
-    if repeats < 1:
-        raise ValueError(f"repeats: found {repeats}; at least 1")
     work()
-    return Median.of([timed(work, time.thread_time) for _ in range(repeats)])
+    return [timed(work, time.thread_time) for _ in range(repeats)]
+
+
+def spread(values: Sequence[float]) -> float:
+    """Return (largest - smallest) / median: how far the machine can be believed."""
+    return float(np.ptp(values) / np.median(values))
 
 
 def interleaved(
-    runs: Mapping[str, Callable[[], float]], rounds: int, *, shuffled: bool = False
-) -> dict[str, tuple[float, ...]]:
+    runs: Mapping[Name, Callable[[], float]], rounds: int, *, shuffled: bool = False
+) -> dict[Name, tuple[float, ...]]:
     """Let ``runs``, each of which returns its seconds, take turns; return them round by round.
 
     Args:
@@ -86,7 +64,7 @@ def interleaved(
         shuffled: in another order every round: who comes after the dearest, or while the machine is
             slow, would otherwise be the same every time.
     """
-    seconds: dict[str, list[float]] = {name: [] for name in runs}
+    seconds: dict[Name, list[float]] = {name: [] for name in runs}
     order, random = list(runs), np.random.default_rng(0)
     for _ in range(rounds):
         if shuffled:
@@ -96,22 +74,13 @@ def interleaved(
     return {name: tuple(taken) for name, taken in seconds.items()}
 
 
-# --- benchmark cases -------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, slots=True)
 class Config:
-    """How long an interleaved run is.
+    """How long an interleaved run is."""
 
-    Attributes:
-        rounds: times that every case has its turn; medians are over these.
-        round_s: about how long one turn lasts, wall seconds.
-        warm_up_s: game time before the first round, so that the states have spread.
-    """
-
-    rounds: int
-    round_s: float
-    warm_up_s: float
+    rounds: int  # turns of every case; medians are over these
+    round_s: float  # about how long one turn lasts, wall
+    warm_up_s: float  # game time before the first round, so that the states have spread
 
     def __post_init__(self) -> None:
         """Refuse what measures nothing."""
@@ -128,13 +97,14 @@ class Case(ABC):
     Attributes:
         name: what tables call it.
         env_steps: environment steps in one of its steps, such as the number of environments.
-        simulated_s: simulated time of one environment step; NaN where that means nothing.
+        simulated_s: simulated time of one environment step.
         steps_done: its steps so far.
+        steps_a_round: its steps in one turn; 0 before `prepare`.
     """
 
     def __init__(self, name: str, env_steps: int, simulated_s: float) -> None:
         self.name, self.env_steps, self.simulated_s = name, env_steps, simulated_s
-        self.steps_done = 0
+        self.steps_done = self.steps_a_round = 0
 
     def run(self, steps: int) -> float:
         """Do ``steps`` steps and return the wall seconds that they took."""
@@ -145,59 +115,38 @@ class Case(ABC):
     def _run(self, steps: int) -> float:
         """Do ``steps`` steps; preparations that a user would not pay for are not counted."""
 
-    def prepare(self, config: Config) -> int:
-        """Warm up, and return the steps of one round."""
+    def prepare(self, config: Config) -> None:
+        """Warm up, and find out how many steps fill a round."""
         self.run(max(1, round(config.warm_up_s / self.simulated_s)))
         steps = 1
         while (taken := self.run(steps)) < config.round_s / 4:
             steps *= 2
-        return max(1, round(steps * config.round_s / taken))
+        self.steps_a_round = max(1, round(steps * config.round_s / taken))
 
     def verify(self) -> None:  # noqa: B027 - most have nothing to verify
         """Raise if what was timed was not what should have been."""
 
-
-@dataclass(frozen=True, slots=True)
-class Result:
-    """What one benchmark case did: the seconds of one environment step, round by round."""
-
-    case: Case
-    seconds: tuple[float, ...]
-
-    @property
-    def env_steps_per_s(self) -> Median:
-        """Environment steps a wall second."""
-        return Median.of([1.0 / seconds for seconds in self.seconds])
+    def close(self) -> None:  # noqa: B027 - most hold nothing
+        """Give back what it holds, such as processes."""
 
 
-def compare(cases: Sequence[Case], config: Config) -> dict[str, Result]:
-    """Let cases take turns, round by round; return the results by name.
+def compare(cases: Sequence[Case], config: Config) -> Frame:
+    """Let cases take turns; a case that follows another stands behind it.
 
-    A case that follows another stands behind it.
+    Returns:
+        (rounds, cases) wall seconds of one environment step, by the cases' names.
     """
-    steps = {case.name: case.prepare(config) for case in cases}
+    for case in cases:
+        case.prepare(config)
 
     def turn(case: Case) -> float:
-        return case.run(steps[case.name]) / (steps[case.name] * case.env_steps)
+        return case.run(case.steps_a_round) / (case.steps_a_round * case.env_steps)
 
-    turns = {case.name: partial(turn, case) for case in cases}
-    seconds = interleaved(turns, config.rounds)
+    seconds = interleaved({case.name: partial(turn, case) for case in cases}, config.rounds)
     for case in cases:
         case.verify()
-    return {case.name: Result(case, seconds[case.name]) for case in cases}
+    return Frame(seconds)
 
-
-def speed_ratio(ours: Result, theirs: Result) -> Median:
-    """Return how many environment steps ``ours`` does while ``theirs`` does one."""
-    return Median.of([b / a for a, b in zip(ours.seconds, theirs.seconds, strict=True)])
-
-
-def simulated_ratio(ours: Result, theirs: Result) -> Median:
-    """Return how much simulated time ``ours`` passes while ``theirs`` passes one second."""
-    return speed_ratio(ours, theirs).times(ours.case.simulated_s / theirs.case.simulated_s)
-
-
-# --- provenance ------------------------------------------------------------------------------
 
 _PACKAGES: Final = ("mujoco", "numpy", "numba", "scipy")
 _CPU_INFO: Final = Path("/proc/cpuinfo")
@@ -226,11 +175,9 @@ def header(facts: Mapping[str, str]) -> str:
 
 
 def _processor() -> str:
-    if _CPU_INFO.exists():
-        for line in _CPU_INFO.read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
+    lines = _CPU_INFO.read_text(encoding="utf-8").splitlines() if _CPU_INFO.exists() else []
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return models[0] if models else platform.processor() or platform.machine()
 
 
 def _version(name: str) -> str:
@@ -238,9 +185,6 @@ def _version(name: str) -> str:
         return version(name)
     except PackageNotFoundError:
         return "not installed"
-
-
-# --- names -----------------------------------------------------------------------------------
 
 
 def known(what: str, name: str, names: Sequence[str]) -> str:

@@ -16,17 +16,11 @@ Start = Callable[[mujoco.MjData], None]
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """What a simulation did, sampled before the first step and after every step or few steps.
+    """What a simulation did, sampled before the first step and after every step or few steps."""
 
-    Attributes:
-        time: (S + 1,) seconds.
-        qpos: (S + 1, nq) MuJoCo's positions.
-        qvel: (S + 1, nv) MuJoCo's velocities.
-    """
-
-    time: Float64
-    qpos: Float64
-    qvel: Float64
+    time: Float64  # (S + 1,) s
+    qpos: Float64  # (S + 1, nq) MuJoCo's positions
+    qvel: Float64  # (S + 1, nv) MuJoCo's velocities
 
     @property
     def finite(self) -> bool:

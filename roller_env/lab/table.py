@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,27 +16,16 @@ __all__ = ["Frame", "frame", "markdown", "write"]
 
 
 def frame(rows: Sequence[Any]) -> Frame:
-    """Return rows, mappings or objects of one dataclass, as a frame.
-
-    Raises:
-        ValueError: no rows, or rows of different classes.
-    """
-    kinds = {type(row) for row in rows}
-    if len(kinds) != 1:
-        names = sorted(kind.__name__ for kind in kinds)
-        raise ValueError(f"a table needs rows of one kind, found {names or 'none'}")
-    return Frame(
-        [asdict(row) if is_dataclass(row) and not isinstance(row, type) else row for row in rows]
-    )
+    """Return rows, mappings or objects of one dataclass, as a frame."""
+    return Frame(list(rows))
 
 
-def write(table: Frame | Sequence[Any], facts: Mapping[str, str], stem: Path) -> tuple[Path, Path]:
-    """Write a frame, or rows of one, as ``stem.csv`` and ``stem.json``; return both paths.
+def write(table: Frame, facts: Mapping[str, str], stem: Path) -> tuple[Path, Path]:
+    """Write a frame as ``stem.csv`` and ``stem.json``; return both paths.
 
     The CSV begins with one comment line of provenance. What is not finite is an empty cell and
     ``null``: strict JSON has neither infinity nor NaN.
     """
-    table = table if isinstance(table, Frame) else frame(table)
     finite = table.replace([np.inf, -np.inf], np.nan).astype(object)
     finite = finite.where(finite.notna(), None)
     stem.parent.mkdir(parents=True, exist_ok=True)
@@ -49,19 +37,14 @@ def write(table: Frame | Sequence[Any], facts: Mapping[str, str], stem: Path) ->
     return csv_file, json_file
 
 
-def markdown(titles: Sequence[str], cells: Sequence[Sequence[object]]) -> str:
-    """Return a Markdown table; numbers are aligned right and given three significant digits."""
-    numeric = [
-        bool(cells) and all(isinstance(row[column], int | float) for row in cells)
-        for column in range(len(titles))
+def markdown(table: Frame | Sequence[str], cells: Sequence[Sequence[object]] | None = None) -> str:
+    """Return a frame, or titles and cells, as Markdown; numbers to the right, with three digits."""
+    titles = list(table)
+    rows = table.astype(object).to_numpy().tolist() if isinstance(table, Frame) else cells or []
+    rules = [
+        "---:" if rows and all(isinstance(row[at], int | float) for row in rows) else "---"
+        for at in range(len(titles))
     ]
-    lines = [
-        "| " + " | ".join(titles) + " |",
-        "|" + "|".join("---:" if is_numeric else "---" for is_numeric in numeric) + "|",
-    ]
-    lines += ["| " + " | ".join(_cell(value) for value in row) + " |" for row in cells]
-    return "\n".join(lines) + "\n"
-
-
-def _cell(value: object) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    shown = [[f"{v:.3g}" if isinstance(v, float) else str(v) for v in row] for row in rows]
+    head = f"| {' | '.join(titles)} |\n|{'|'.join(rules)}|\n"
+    return head + "".join(f"| {' | '.join(row)} |\n" for row in shown)

@@ -21,8 +21,6 @@ from roller_env.lab.accuracy import (
     accurate_steps,
     cheapest,
     page,
-    pareto,
-    pieces,
     run,
     scenes_named,
     time_steps,
@@ -31,6 +29,7 @@ from roller_env.lab.accuracy import (
 from roller_env.lab.chart import COLOURS, duration
 from roller_env.lab.free import DRAG, FREE_SCENES, FreeScene
 from roller_env.lab.methods import FREE
+from roller_env.lab.scene import pareto
 from roller_env.lab.table import Frame, frame
 
 ROOT = Path(__file__).parents[2]
@@ -106,7 +105,7 @@ def test_a_step_beyond_a_failing_one_is_luck() -> None:
     ]
     (found,) = rows(accurate_steps(frame(curve)))
     assert (found.largest_dt_s, found.first_failing_dt_s) == (0.1, 0.2)
-    assert pareto(frame(curve), "CPU time").dt_s.tolist() == [0.1]
+    assert pareto(frame(curve), "cpu_s_per_s").dt_s.tolist() == [0.1]
 
 
 def test_an_error_that_is_no_number_is_a_failure() -> None:
@@ -117,7 +116,7 @@ def test_an_error_that_is_no_number_is_a_failure() -> None:
 
 def test_nothing_on_the_pareto_front_is_beaten_and_everything_off_it_is() -> None:
     every = [*SLOW_AND_GOOD, *FAST_AND_BAD, point("worse", 0.1, 6e-2, 2e-4)]
-    front = pareto(frame(every), "CPU time")
+    front = pareto(frame(every), "cpu_s_per_s")
     assert front.method.tolist() == ["bad", "bad", "good", "good"]
     for number, one in enumerate(every):
         beaten = any(
@@ -129,7 +128,7 @@ def test_nothing_on_the_pareto_front_is_beaten_and_everything_off_it_is() -> Non
 
 def test_exact_is_exact_however_many_digits_more_a_dearer_step_has() -> None:
     exact = [point("one", 0.1, 5e-15, 1e-3), point("other", 0.1, 1e-16, 1e-2)]
-    assert pareto(frame(exact), "CPU time").method.tolist() == ["one"]
+    assert pareto(frame(exact), "cpu_s_per_s").method.tolist() == ["one"]
 
 
 # --- what is run -----------------------------------------------------------------------------
@@ -169,22 +168,15 @@ def test_a_time_step_is_written_with_its_unit() -> None:
 
 
 @pytest.fixture(scope="module")
-def quick() -> tuple[Results, list[str]]:
-    done: list[str] = []
-    scenes = scenes_named(["drag", "push"], QUICK)
-    return run(scenes, replace(QUICK, repeats=1), done.append), done
+def quick() -> Results:
+    return run(scenes_named(["drag", "push"], QUICK), replace(QUICK, repeats=1))
 
 
 @pytest.fixture(scope="module")
-def files(quick: tuple[Results, list[str]], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def files(quick: Results, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("accuracy")
-    write(quick[0], out)
+    write(quick, out)
     return out
-
-
-def test_progress_is_told_as_often_as_promised(quick: tuple[Results, list[str]]) -> None:
-    results, done = quick
-    assert len(done) == pieces(results.scenes, QUICK)
 
 
 def test_there_is_a_chart_for_each_kind_of_error_and_never_both_in_one(files: Path) -> None:
@@ -194,43 +186,36 @@ def test_there_is_a_chart_for_each_kind_of_error_and_never_both_in_one(files: Pa
     assert not (files / "drag-model.png").exists()
 
 
-def test_the_tables_hold_every_point_with_its_provenance(
-    quick: tuple[Results, list[str]], files: Path
-) -> None:
-    results, _ = quick
+def test_the_tables_hold_every_point_with_its_provenance(quick: Results, files: Path) -> None:
     document = json.loads((files / "points.json").read_text(encoding="utf-8"))
     assert {"machine", "mujoco", "numpy", "python", "command"} <= set(document["provenance"])
-    assert len(document["rows"]) == len(results.points)
+    assert len(document["rows"]) == len(quick.points)
     first, *rest = (files / "points.csv").read_text(encoding="utf-8").splitlines()
     assert first.startswith("# command")
     rows = list(csv.DictReader(rest))
     tried = {(row["scene"], row["method"], float(row["dt_s"])) for row in rows}
-    for scene in results.scenes:
+    for scene in quick.scenes:
         for method in scene.methods:
             for dt_s in time_steps(scene, method, QUICK):
                 assert (scene.name, method.name, dt_s) in tried
 
 
-def test_the_page_answers_the_readers_questions(
-    quick: tuple[Results, list[str]], files: Path
-) -> None:
+def test_the_page_answers_the_readers_questions(quick: Results, files: Path) -> None:
     text = (files / "accuracy.md").read_text(encoding="utf-8")
     assert "# Orders" in text
     assert "MuJoCo RK4" in text
     for tolerance in ("1e-03", "1e-06", "1e-09"):
         assert tolerance in text
     assert "Not as theory expects" not in text
-    assert page(quick[0], {"machine": "here"}).startswith("# Accuracy against cost\n\nmachine here")
+    assert page(quick, {"machine": "here"}).startswith("# Accuracy against cost\n\nmachine here")
 
 
-def test_a_chart_shows_only_its_own_scenes_points(quick: tuple[Results, list[str]]) -> None:
-    results, _ = quick
-    scene, measure = results.charted("discretisation")[0]
-    plot = results.plot(scene, measure)
-    assert (scene.name, measure.name) == ("drag", "position")
-    own = results.points[(results.points.scene == "drag") & (results.points.measure == "position")]
-    shown = {error for curve in plot.curves.values() for _, error, _ in curve}
-    assert shown == set(own[~own.failed].error) & shown
+def test_a_chart_shows_only_its_own_scenes_points(quick: Results) -> None:
+    plot = quick.charted("discretisation")["drag"]
+    own = quick.points[(quick.points.scene == "drag") & (quick.points.measure == "position")]
+    shown = {error for curve in plot.curves().values() for error in curve.error}
+    assert shown
+    assert shown <= set(own[~own.failed].error)
     assert plot.limits_s == DRAG.limits_s
 
 

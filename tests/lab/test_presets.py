@@ -15,8 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roller_env.lab.presets import ablations, report
-from roller_env.lab.presets.catalogue import FEW, SETTINGS
+from roller_env.lab.presets import costs, report
 from roller_env.lab.presets.errors import (
     Errors,
     course,
@@ -33,8 +32,8 @@ from roller_env.lab.presets.errors import (
     squeeze,
     violations,
 )
-from roller_env.lab.presets.results import front
-from roller_env.lab.presets.setting import Setting, set_flag
+from roller_env.lab.presets.report import front
+from roller_env.lab.presets.settings import FEW, SETTINGS, Setting, set_flag
 from roller_env.level import load_level
 from roller_env.physics.presets import PRESETS
 from scripts import presets as script
@@ -199,7 +198,7 @@ def test_nothing_beats_what_is_on_the_front_and_something_beats_the_rest(
 def test_what_the_compiler_leaves_out_does_not_change_the_way_of_the_ball() -> None:
     rows = {
         row.what: row
-        for row in ablations.measure(rounds=1, boxes=(200,), games=2).itertuples()
+        for row in costs.ablations(rounds=1, boxes=(200,), games=2).itertuples()
         if not row.boxes
     }
     same = ("explicit pairs", "coins as geoms", "coins as sites", "midphase on", "fixed geoms")
@@ -207,7 +206,7 @@ def test_what_the_compiler_leaves_out_does_not_change_the_way_of_the_ball() -> N
         if what.startswith(same):
             assert row.same_bits, what
     cells = rows["every floor cell a geom"]
-    assert cells.geoms > 3 * rows[ablations.AS_CHOSEN].geoms
+    assert cells.geoms > 3 * rows[costs.AS_CHOSEN].geoms
 
 
 def test_the_script_leaves_tables_and_charts(

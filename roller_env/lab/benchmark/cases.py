@@ -9,9 +9,10 @@ steps, which makes physics alone faster than one would find it.
 from __future__ import annotations
 
 import multiprocessing
-from collections.abc import Iterator, Mapping
-from types import TracebackType
-from typing import Any, Final, NamedTuple, Self
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
+from typing import Any, Final
 
 import gymnasium as gym
 import mujoco
@@ -45,17 +46,8 @@ SEED: Final = 0
 STATE: Final = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
-class ReplayError(RuntimeError):
-    """The physics alone did not go where the game went, so its time says nothing."""
-
-
 def check_options(options: Mapping[str, Any]) -> None:
-    """Raise what making an environment with these options would raise, before anything runs.
-
-    Raises:
-        ValueError: an option is unknown or its value is not allowed.
-        LevelError: the level is not valid.
-    """
+    """Raise what making an environment with these options would raise, before anything runs."""
     load_level(make_config(**options).level)
 
 
@@ -66,104 +58,66 @@ def random_actions(num_envs: int) -> Iterator[Int64]:
         yield rng.integers(len(DIRECTIONS), size=num_envs)
 
 
-# --- our environments ------------------------------------------------------------------------
-
-
 class Game(Case):
-    """An environment of ours under random keys; what stands behind it does its physics again.
+    """An environment of ours under random keys; what stands behind it does its physics again."""
 
-    Attributes:
-        options: those of `roller_env.config.EnvConfig`.
-        steps_a_round: of the interleaved run; 0 before `prepare`.
-    """
-
-    simulation: Simulation
-
-    def __init__(self, name: str, num_envs: int, options: Mapping[str, Any]) -> None:
-        self.options, self.steps_a_round = dict(options), 0
+    def __init__(
+        self, name: str, num_envs: int, simulation: Simulation, options: Mapping[str, Any]
+    ) -> None:
+        self.simulation, self.options = simulation, dict(options)
         self._actions = random_actions(num_envs)
-        super().__init__(name, num_envs, self.simulation.duration_s)
+        super().__init__(name, num_envs, simulation.duration_s)
 
-    def prepare(self, config: Config) -> int:
-        """Warm up, and return the steps of one round."""
-        self.steps_a_round = super().prepare(config)
-        return self.steps_a_round
+    def _run(self, steps: int) -> float:
+        actions = [next(self._actions) for _ in range(steps)]
+        return timed(partial(self._play, actions))
+
+    @abstractmethod
+    def _play(self, actions: Sequence[Int64]) -> None:
+        """Step once an action."""
 
 
 class VectorStep(Game):
     """Whole steps of the vector environment: rules, observation, reward and autoreset."""
 
     def __init__(self, name: str, num_envs: int, num_threads: int, **options: Any) -> None:
-        """Begin the games; ``options`` are those of `roller_env.config.EnvConfig`."""
         options = {"num_threads": num_threads, **options}
         self._env = RollerVectorEnv(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **options)
         self._env.reset(seed=SEED)
-        self.simulation = self._env.simulation
-        super().__init__(name, num_envs, options)
+        super().__init__(name, num_envs, self._env.simulation, options)
 
-    def _run(self, steps: int) -> float:
-        actions = [next(self._actions) for _ in range(steps)]
+    def _play(self, actions: Sequence[Int64]) -> None:
         step = self._env.step
-
-        def play() -> None:
-            for action in actions:
-                step(action)
-
-        return timed(play)
+        for action in actions:
+            step(action)
 
 
 class SingleStep(Game):
     """Steps of one environment as `gymnasium.make` makes it, wrappers and resets included."""
 
     def __init__(self, name: str, **options: Any) -> None:
-        """Begin the game; ``options`` are those of `roller_env.config.EnvConfig`."""
         options = {"num_threads": 1, **options}
         self._env: gym.Env[Any, Any] = gym.make("roller_env:Roller/Level-v0", **options)
         self._env.reset(seed=SEED)
         game = self._env.unwrapped
         assert isinstance(game, RollerEnv)
-        self.simulation = game.simulation
-        super().__init__(name, 1, options)
+        super().__init__(name, 1, game.simulation, options)
 
-    def _run(self, steps: int) -> float:
-        actions = [next(self._actions)[0] for _ in range(steps)]
+    def _play(self, actions: Sequence[Int64]) -> None:
         env = self._env
-
-        def play() -> None:
-            for action in actions:
-                _, _, terminated, truncated, _ = env.step(action)
-                if terminated or truncated:
-                    env.reset()
-
-        return timed(play)
-
-
-# --- physics alone ---------------------------------------------------------------------------
-
-
-class _RecordedStep(NamedTuple):
-    """What one control step's physics depends on.
-
-    Attributes:
-        control: (N, nu) the actuators' controls during the step.
-        ended: (n,) rows whose episode it ended.
-        fresh: (n, nstate) the integration states that those rows were put into after it.
-    """
-
-    control: Float64
-    ended: Int64
-    fresh: Float64
+        for action in actions:
+            _, _, terminated, truncated, _ = env.step(action[0])
+            if terminated or truncated:
+                env.reset()
 
 
 class PhysicsAlone(Case):
-    """The physics of a game once more, step by step, to the bit, and nothing else."""
+    """The physics of a game, its leader, once more, step by step, to the bit, and nothing else."""
 
     def __init__(self, name: str, leader: Game) -> None:
-        """Do what ``leader`` does, behind it."""
         count = leader.env_steps
-        options = leader.options
         self._leader, self._actions = leader, random_actions(count)
-        self._env = RollerVectorEnv(count, autoreset_mode=AutoresetMode.DISABLED, **options)
+        self._env = RollerVectorEnv(count, autoreset_mode=AutoresetMode.DISABLED, **leader.options)
         self._env.reset(seed=SEED)
         games = self._env.simulation
         self.model: mujoco.MjModel = compile_level(games.level, games.preset).model
@@ -174,41 +128,55 @@ class PhysicsAlone(Case):
         self._control = slice(begin, begin + self.model.nu)
         super().__init__(name, count, leader.simulated_s)
 
-    def prepare(self, config: Config) -> int:
-        """Catch up with the leader, and return the steps of its rounds."""
+    def prepare(self, config: Config) -> None:
+        """Catch up with the leader, and take as many steps a round."""
         self.run(self._leader.steps_done)
-        return self._leader.steps_a_round
+        self.steps_a_round = self._leader.steps_a_round
 
     @property
     def _states(self) -> Float64:
         return self._env.simulation.snapshot().physics
 
-    def _recorded(self, steps: int) -> list[_RecordedStep]:
-        return [self._record_step() for _ in range(steps)]
+    def _record_step(self) -> tuple[Float64, Int64, Float64]:
+        """Return what one control step's physics depends on.
 
-    def _record_step(self) -> _RecordedStep:
+        (N, nu) the actuators' controls during it, (n,) rows whose episode it ended, and (n, nstate)
+        the integration states that those rows were put into after it.
+        """
         _, _, terminated, truncated, _ = self._env.step(next(self._actions))
-        control = self._states[:, self._control].copy()
-        over = terminated | truncated
+        control, over = self._states[:, self._control].copy(), terminated | truncated
         rows = np.flatnonzero(over)
         if len(rows):
             self._env.reset(options={"reset_mask": over})
-        return _RecordedStep(control, rows, self._env.simulation.snapshot(rows).physics)
+        return control, rows, self._env.simulation.snapshot(rows).physics
 
+    def _run(self, steps: int) -> float:
+        seconds = 0.0
+        for control, ended, fresh in [self._record_step() for _ in range(steps)]:
+            with profiler_off():
+                seconds += self._step(control)
+            if len(ended):
+                self._put(ended, fresh)
+        return seconds
+
+    @abstractmethod
+    def _step(self, control: Float64) -> float:
+        """Do a control step's physics, and return the seconds that it took."""
+
+    @abstractmethod
+    def _put(self, rows: Int64, states: Float64) -> None:
+        """Put rows into integration states, (n, nstate)."""
+
+    @abstractmethod
     def _reached(self) -> Float64:
         """Return the integration states, (N, nstate)."""
-        raise NotImplementedError
 
     def verify(self) -> None:
-        """Raise unless every ball is, to the bit, where the leader's is.
-
-        Raises:
-            ReplayError: one is not.
-        """
+        """Raise a RuntimeError unless every ball is, to the bit, where the leader's is."""
         theirs = self._leader.simulation.snapshot().physics
         wrong = np.flatnonzero((self._reached() != theirs).any(axis=1))
         if len(wrong):
-            raise ReplayError(
+            raise RuntimeError(
                 f"{self.name}: after {self._leader.steps_done} steps row(s) {wrong[:5].tolist()} "
                 f"are not where those of {self._leader.name} are; the two did not do the same work"
             )
@@ -218,7 +186,6 @@ class BatchAlone(PhysicsAlone):
     """`mujoco.batch.Batch`, of which only `Batch.step` is timed: neither controls nor resets."""
 
     def __init__(self, name: str, leader: VectorStep) -> None:
-        """Do what ``leader`` does, behind it."""
         super().__init__(name, leader)
         threads = leader.simulation.config.num_threads
         # As the game's stepper opens it.
@@ -227,16 +194,13 @@ class BatchAlone(PhysicsAlone):
         self._batch.state[:] = self._states
         self._ctrl = self._batch.bind("ctrl")
 
-    def _run(self, steps: int) -> float:
-        seconds = 0.0
-        for recorded in self._recorded(steps):
-            self._ctrl[:] = recorded.control
-            with profiler_off():
-                seconds += timed(lambda: self._batch.step(nstep=self.substeps))
-            if len(recorded.ended):
-                self._batch.reset(recorded.ended, stage=mujoco.mjtStage.mjSTAGE_NONE)
-                self._batch.state[recorded.ended] = recorded.fresh
-        return seconds
+    def _step(self, control: Float64) -> float:
+        self._ctrl[:] = control
+        return timed(lambda: self._batch.step(nstep=self.substeps))
+
+    def _put(self, rows: Int64, states: Float64) -> None:
+        self._batch.reset(rows, stage=mujoco.mjtStage.mjSTAGE_NONE)
+        self._batch.state[rows] = states
 
     def _reached(self) -> Float64:
         return np.asarray(self._batch.state)
@@ -246,39 +210,29 @@ class BareLoop(PhysicsAlone):
     """A Python loop of `mj_step`. Setting the controls is timed as well; resets are not."""
 
     def __init__(self, name: str, leader: SingleStep) -> None:
-        """Do what ``leader`` does, behind it."""
         super().__init__(name, leader)
         self._data = mujoco.MjData(self.model)
-        self._put(self._states[0])
+        self._put(np.zeros(1, np.int64), self._states)
 
-    def _run(self, steps: int) -> float:
-        model, data, seconds = self.model, self._data, 0.0
-        substeps = range(self.substeps)
-        for recorded in self._recorded(steps):
-            control = recorded.control[0]
+    def _step(self, control: Float64) -> float:
+        model, data, substeps, now = self.model, self._data, range(self.substeps), control[0]
 
-            def loop(control: Float64 = control) -> None:
-                data.ctrl[:] = control
-                for _ in substeps:
-                    mujoco.mj_step(model, data)
+        def loop() -> None:
+            data.ctrl[:] = now
+            for _ in substeps:
+                mujoco.mj_step(model, data)
 
-            with profiler_off():
-                seconds += timed(loop)
-            if len(recorded.ended):
-                self._put(recorded.fresh[0])
-        return seconds
+        return timed(loop)
 
-    def _put(self, state: Float64) -> None:
+    def _put(self, rows: Int64, states: Float64) -> None:
         mujoco.mj_resetData(self.model, self._data)
-        mujoco.mj_setState(self.model, self._data, state, STATE)
+        mujoco.mj_setState(self.model, self._data, states[0], STATE)
 
     def _reached(self) -> Float64:
         state = np.empty((1, mujoco.mj_stateSize(self.model, STATE)))
         mujoco.mj_getState(self.model, self._data, state[0], STATE)
         return state
 
-
-# --- training end to end ---------------------------------------------------------------------
 
 _ROLLOUT_STEPS, _EPOCHS, _BATCHES = 64, 4, 4
 """Of a rollout. These are near those of configs/; all else are SB3's defaults."""
@@ -291,28 +245,18 @@ class Training(Case):
     """
 
     def __init__(self, name: str, model: PPO, simulated_s: float) -> None:
-        """Run a learner, its environments inside."""
         self._model = model
         super().__init__(name, model.n_envs * model.n_steps, simulated_s)
 
-    def __enter__(self) -> Self:
-        """Return the training."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         """Close the environments, which may be processes."""
         assert self._model.env is not None
         self._model.env.close()
 
-    def prepare(self, config: Config) -> int:
+    def prepare(self, config: Config) -> None:
         """Do one update unseen; a round is as many as fill it, but one at least."""
         self.run(1)
-        return max(1, round(config.round_s / self.run(1)))
+        self.steps_a_round = max(1, round(config.round_s / self.run(1)))
 
     def _run(self, steps: int) -> float:
         return timed(lambda: self._model.learn(steps * self.env_steps, reset_num_timesteps=False))
@@ -349,11 +293,12 @@ def as_make_train_does(name: str, config: TrainingConfig) -> Training:
 
 def _ppo(environments: VecEnv) -> PPO:
     torch.set_num_threads(1)
+    batch = environments.num_envs * _ROLLOUT_STEPS // _BATCHES
     return PPO(
         "MlpPolicy",
         environments,
         n_steps=_ROLLOUT_STEPS,
-        batch_size=environments.num_envs * _ROLLOUT_STEPS // _BATCHES,
+        batch_size=batch,
         n_epochs=_EPOCHS,
         seed=SEED,
         device="cpu",

@@ -6,8 +6,7 @@ import json
 import subprocess
 import tempfile
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Final, Self
+from typing import Any, Final
 
 from roller_env.lab.runner import Case
 
@@ -22,24 +21,16 @@ class PeerError(RuntimeError):
 
 
 class Peer(Case):
-    """An environment of `peer_worker`, stepped over a pipe; the pipe's time is not counted.
+    """An environment of `peer_worker`, stepped over a pipe; the pipe's time is not counted."""
 
-    Attributes:
-        versions: of the packages that it is made of.
-    """
+    versions: dict[str, str]  # of the packages that it is made of
 
     def __init__(self, name: str, interpreter: Path, **wanted: Any) -> None:
-        """Start the worker.
+        """Start the worker in the peers' ``interpreter``, or raise a `PeerError`.
 
-        Args:
-            name: what tables call it.
-            interpreter: Python of an environment that has the peers.
-            wanted: ``peer`` is a key of `peer_worker.PEERS`; the others are its arguments.
-
-        Raises:
-            PeerError: the worker did not come up.
+        Of what is ``wanted`` ``peer`` is a key of `peer_worker.PEERS`; the others its arguments.
         """
-        self._complaints = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 - __exit__
+        self._complaints = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 - close
         self._process = subprocess.Popen(
             [interpreter, str(_WORKER), json.dumps(wanted)],
             stdin=subprocess.PIPE,
@@ -48,19 +39,10 @@ class Peer(Case):
             text=True,
         )
         facts = self._answer(name)
-        self.versions: dict[str, str] = facts["versions"]
+        self.versions = facts["versions"]
         super().__init__(name, facts["env_steps"], facts["simulated_s"])
 
-    def __enter__(self) -> Self:
-        """Return the peer."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         """End the worker, which stops when its input does."""
         self._process.communicate()
         self._complaints.close()
@@ -73,14 +55,10 @@ class Peer(Case):
 
     def _answer(self, name: str) -> dict[str, Any]:
         assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line:
-            self._process.wait()
-            self._complaints.seek(0)
-            last = self._complaints.read().strip().splitlines()[-1:]
-            raise PeerError(
-                f"{name}: the worker ended with code {self._process.returncode}: "
-                f"{' '.join(last) or 'no message'}"
-            )
-        answer: dict[str, Any] = json.loads(line)
-        return answer
+        if line := self._process.stdout.readline():
+            answer: dict[str, Any] = json.loads(line)
+            return answer
+        code = self._process.wait()
+        self._complaints.seek(0)
+        last = self._complaints.read().strip().splitlines() or ["no message"]
+        raise PeerError(f"{name}: the worker ended with code {code}: {last[-1]}")

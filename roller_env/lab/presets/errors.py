@@ -3,34 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
 
-from roller_env.compile.compiled import CompiledLevel
 from roller_env.config import EnvConfig
 from roller_env.game.actions import forces, held_keys
-from roller_env.lab.game import (
-    DECK_M,
-    FRICTION,
-    GATE_SPEED_M_S,
-    GRAVITY_M_S2,
-    LIFT_N,
-    LIFT_S,
-    RADIUS_M,
-    THROUGH_M,
-    TUBE_FALL_M,
-    Course,
-    make_level,
-    play,
-    played,
-)
-from roller_env.lab.presets.setting import Setting
+from roller_env.lab import game
+from roller_env.lab.game import DECK_M, GRAVITY_M_S2, LIFT_N, LIFT_S, RADIUS_M, THROUGH_M
+from roller_env.lab.presets.settings import Setting
 from roller_env.lab.stability.failures import hanging_gate_level, seam_level
 from roller_env.level import Level, load_level
 from roller_env.physics.presets import PhysicsPreset
@@ -38,54 +22,50 @@ from roller_env.physics.stepper import keeps_poses
 from roller_env.units import quants
 
 Float64 = npt.NDArray[np.float64]
+Errors = dict[str, float]
+"""What one setting gets wrong, by names such as those of `REQUIREMENTS`."""
 
-LANE_M: Final = 80.0
 LOST_M: Final = 1e4
-ROLLING: Final = 1.4
-"""Inertia of a solid ball that rolls, over its mass."""
+ARRIVALS: Final = np.linspace(0.02, 0.98, 12)
+"""Shares of a step after which a ball touches the ground."""
 
 
 class World:
-    """Some balls on one level, and no rules.
+    """Some balls on one level, and no rules."""
 
-    Attributes:
-        compiled: the level.
-        position: (balls, 3) live view, m.
-        velocity: (balls, 3) live view, m/s.
-        spin: (balls, 3) live view, rad/s.
-        qpos: (balls, nq) live view.
-        ctrl: (balls, nu) live view.
-        went: (balls, S, nq) every position after the steps of the last `advance`.
-    """
+    position: Float64  # (balls, 3) live view, m
+    velocity: Float64  # (balls, 3) live view, m/s
+    spin: Float64  # (balls, 3) live view, rad/s
+    ctrl: Float64  # (balls, nu) live view
+    went: Float64  # (balls, S, nq) after every step of the last `advance`
 
-    def __init__(self, setting: Setting, level: Level, balls: int, step_s: float):
-        """Compile the level; each `advance` will last ``step_s``."""
-        self.compiled: CompiledLevel = setting.compile(level)
-        self._steps = round(step_s / setting.preset.dt_s)
-        self._batch = Batch(
-            self.compiled.model, balls, 1, persistent=keeps_poses(self.compiled.model)
-        )
-        self.qpos: Float64 = self._batch.bind("qpos")
-        qvel: Float64 = self._batch.bind("qvel")
-        self.ctrl: Float64 = self._batch.bind("ctrl")
-        self.went: Float64 = np.empty((balls, 0, self.compiled.model.nq))
+    def __init__(self, setting: Setting, level: Level, position: npt.ArrayLike):
+        """Compile the level, with balls at rest at ``position``, (balls, 3) m."""
+        self.compiled, self.dt_s = setting.compile(level), setting.preset.dt_s
+        model, position = self.compiled.model, np.asarray(position)
+        self._batch = Batch(model, len(position), 1, persistent=keeps_poses(model))
+        self.ctrl, qpos, qvel = (self._batch.bind(name) for name in ("ctrl", "qpos", "qvel"))
         start, velocity = self.compiled.ball_qpos, self.compiled.ball_qvel
         self._place, self._speed = slice(start, start + 3), slice(velocity, velocity + 3)
-        self.position = self.qpos[:, self._place]
-        self.velocity = qvel[:, self._speed]
+        self.position, self.velocity = qpos[:, self._place], qvel[:, self._speed]
         self.spin = qvel[:, velocity + 3 : velocity + 6]
+        self.position[:] = position
+
+    def roll(self, speed: Float64) -> None:
+        """Have balls roll along x, (balls,) m/s."""
+        self.velocity[:, 0], self.spin[:, 1] = speed, speed / RADIUS_M
 
     def force(self, newtons: Float64) -> None:
         """Push every ball, (balls, 2 or 3) N along x, y and z."""
         self.ctrl[:, self.compiled.force_ctrl[: newtons.shape[1]]] = newtons
 
-    def advance(self) -> tuple[Float64, Float64]:
-        """Return places, m, and velocities, m/s, from the start on: both (balls, S + 1, 3).
+    def advance(self, seconds: float, times: int = 1) -> tuple[Float64, Float64]:
+        """Go on for some times so many seconds; return places, m, and velocities, m/s.
 
-        NaN where a ball has left the world.
+        Both (balls, S + 1, 3), from the start on; NaN where a ball has left the world.
         """
         before = self.position[:, None].copy(), self.velocity[:, None].copy()
-        went = self._batch.rollout(self._steps, record=("qpos", "qvel"))
+        went = self._batch.rollout(times * round(seconds / self.dt_s), record=("qpos", "qvel"))
         self.went = went["qpos"]
         after = went["qpos"][:, :, self._place], went["qvel"][:, :, self._speed]
         place, velocity = (np.concatenate(pair, 1) for pair in zip(before, after, strict=True))
@@ -93,79 +73,79 @@ class World:
         place[lost] = velocity[lost] = np.nan
         return place, velocity
 
-    def path(self) -> Float64:
-        """Return the places of `advance`."""
-        return self.advance()[0]
+
+def _each(*values: npt.ArrayLike) -> tuple[Float64, ...]:
+    """Return every combination of some values, the first changing last."""
+    return tuple(axis.ravel() for axis in np.meshgrid(*values, indexing="ij"))
 
 
-# Driving -------------------------------------------------------------------------------------
+def _worst(values: Float64) -> float:
+    """Return the largest, infinite where any is not finite."""
+    return float(values.max()) if np.isfinite(values).all() else math.inf
 
-SEQUENCES: Final[tuple[tuple[str, ...], ...]] = (
+
+def _over_ground(height: npt.ArrayLike) -> Float64:
+    """Return places over the origin with the ball's lowest point at heights, (balls, 3) m."""
+    return np.multiply.outer(RADIUS_M + np.asarray(height), (0.0, 0.0, 1.0))
+
+
+SEQUENCES: Final = (
     ("w", "w", "w", "w", "w", "w", "w", "w", "w", "w"),
     ("w", "w", "w", "wa", "wa", "a", "d", "d", "sd", "sd"),
     ("wd", "w", "wa", "a", "as", "s", "sd", "d", "wd", "w"),
     ("a", "", "a", "", "aw", "aw", "", "d", "d", "s"),
+    *((keys,) * 10 for keys in ("w", "wa", "a", "as", "s", "sd", "d", "wd")),
 )
-"""Keys of ``wasd`` held for half a second each: straight on, there and back, round, in pauses."""
-
+"""Keys of ``wasd`` held for half a second each: straight on, there and back, round, in pauses; and
+in all eight directions."""
 HELD_S: Final = 0.5
-KEYS_OF_HEADINGS: Final = ("w", "wa", "a", "as", "s", "sd", "d", "wd")
 
 
-def driving(setting: Setting) -> dict[str, float]:
-    """Drive 5 s on open ground, against the rigid ball's exact way; and push in 8 directions."""
-    straight = [(keys,) * len(SEQUENCES[0]) for keys in KEYS_OF_HEADINGS]
-    plans = [*SEQUENCES, *straight]
-    world = World(setting, make_level(), len(plans), HELD_S)
-    world.position[:] = 0.0, 0.0, RADIUS_M
-    exact = np.zeros((len(plans), 2))
-    speed, way, ends = exact.copy(), np.zeros(len(plans)), []
-    for held in zip(*plans, strict=True):
+def driving(setting: Setting) -> Errors:
+    """Drive 5 s on open ground, against the rigid ball's exact way; and push in 8 directions.
+
+    Distance from a rigid ball's place over the way rolled, worst of twelve sequences of keys; and
+    the largest error of the direction in which keys push.
+    """
+    world = World(setting, game.make_level(), _over_ground(np.zeros(len(SEQUENCES))))
+    exact, speed, way = np.zeros((12, 2)), np.zeros((12, 2)), np.zeros(12)
+    for held in zip(*SEQUENCES, strict=True):
         newtons = np.array([forces("keys", held_keys(keys)[None])[0] for keys in held])
         world.force(newtons)
-        path = world.path()[:, :, :2]
-        push = newtons / ROLLING
+        path = world.advance(HELD_S)[0][:, :, :2]
+        push = newtons / 1.4  # inertia of a solid ball that rolls, over its mass
         exact = exact + speed * HELD_S + 0.5 * push * HELD_S**2
         speed = speed + push * HELD_S
         way += np.linalg.norm(np.diff(path, axis=1), axis=2).sum(axis=1)
-        ends.append(path[:, -1])
-    away = np.linalg.norm(ends[-1] - exact, axis=1) / way
-    drawn = ends[-1][len(SEQUENCES) :]
-    meant = exact[len(SEQUENCES) :]
-    heading = np.arctan2(drawn[:, 1], drawn[:, 0]) - np.arctan2(meant[:, 1], meant[:, 0])
-    heading = (heading + math.pi) % (2.0 * math.pi) - math.pi
+    end = path[:, -1]
+    drawn, meant = (np.arctan2(place[4:, 1], place[4:, 0]) for place in (end, exact))
+    heading = (drawn - meant + math.pi) % (2.0 * math.pi) - math.pi
     return {
-        "path": _worst(away),
+        "path": _worst(np.linalg.norm(end - exact, axis=1) / way),
         "heading_deg": _worst(np.degrees(np.abs(heading))),
     }
 
 
-# Landing -------------------------------------------------------------------------------------
-
-FALL_S: Final = 4.0
 FASTEST_M_S: Final = 36.0
 """Of a ball that enters classic's tube as fast as it can, climbs its wall and flies 66 m up."""
-ARRIVALS: Final = np.linspace(0.02, 0.98, 12)
-"""Shares of a step after which a ball touches the ground."""
 TUNNEL_SPEEDS_M_S: Final = np.arange(10.0, 121.0, 5.0)
 
 
-def landing(setting: Setting) -> dict[str, float]:
-    """Drop and throw balls on the thinnest deck: how deep they get, and from when on through."""
+def landing(setting: Setting) -> Errors:
+    """Drop and throw balls on the thinnest deck: how deep they get, and from when on through.
+
+    Depth of the landing after 46.9 m and at 36 m/s over that at which a ball falls through, and the
+    least speed tried at which one passes the deck, or infinite.
+    """
     deck = {"at": (0.0, 0.0, -DECK_M / 2), "size": (50.0, 50.0, DECK_M)}
-    level = make_level(boxes=[deck], start={"at": (0.0, 0.0, RADIUS_M)})
-    falling = World(setting, level, len(ARRIVALS), FALL_S)
-    falling.position[:, :2] = 0.0
+    level = game.make_level(boxes=[deck], start={"at": (0.0, 0.0, RADIUS_M)})
     # 0.5 m of height are one step of 1/60 s at 30 m/s.
-    falling.position[:, 2] = RADIUS_M + TUBE_FALL_M + 0.5 * ARRIVALS
-    fallen = _depth(falling.path())
-    speeds = np.array([FASTEST_M_S, *TUNNEL_SPEEDS_M_S])
-    speed, arrival = (a.ravel() for a in np.meshgrid(speeds, ARRIVALS, indexing="ij"))
-    thrown = World(setting, level, len(speed), 0.5)
-    thrown.position[:, :2] = 0.0
-    thrown.position[:, 2] = RADIUS_M + speed * setting.preset.dt_s * arrival
+    falling = World(setting, level, _over_ground(game.TUBE_FALL_M + 0.5 * ARRIVALS))
+    fallen = _depth(falling.advance(4.0)[0])
+    speed, arrival = _each([FASTEST_M_S, *TUNNEL_SPEEDS_M_S], ARRIVALS)
+    thrown = World(setting, level, _over_ground(speed * setting.preset.dt_s * arrival))
     thrown.velocity[:, 2] = -speed
-    depth = _depth(thrown.path()).reshape(len(speeds), -1).max(axis=1)
+    depth = _depth(thrown.advance(0.5)[0]).reshape(-1, len(ARRIVALS)).max(axis=1)
     passing = TUNNEL_SPEEDS_M_S[depth[1:] > THROUGH_M]
     return {
         "landing_share": float(fallen.max() / THROUGH_M),
@@ -180,53 +160,37 @@ def _depth(path: Float64) -> Float64:
     return depth
 
 
-# Elasticity ----------------------------------------------------------------------------------
-
-ELASTICITIES: Final = (0.0, 0.2, 0.5, 0.8, 0.95)
-SPEEDS_M_S: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)
-WEIGHTLESS_M_S2: Final = 0.001
-
-
-def elasticity(setting: Setting) -> dict[str, float]:
+def elasticity(setting: Setting) -> Errors:
     """Bounce balls of every elasticity at every speed, without gravity, which takes its part."""
-    worst = 0.0
-    speed, arrival = (a.ravel() for a in np.meshgrid(SPEEDS_M_S, ARRIVALS[::2]))
-    for one in ELASTICITIES:
-        level = make_level(ball={"elasticity": one}, gravity=WEIGHTLESS_M_S2)
-        world = World(setting, level, len(speed), 0.6)
-        world.position[:] = 0.0
-        world.position[:, 2] = RADIUS_M + speed * setting.preset.dt_s * arrival
+    errors = []
+    speed, arrival = _each([0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0], ARRIVALS[::2])
+    for one in (0.0, 0.2, 0.5, 0.8, 0.95):
+        level = game.make_level(ball={"elasticity": one}, gravity=0.001)
+        world = World(setting, level, _over_ground(speed * setting.preset.dt_s * arrival))
         world.velocity[:, 2] = -speed
-        height = world.path()[:, :, 2]
+        height = world.advance(0.6)[0][:, :, 2]
         returned = np.diff(height, axis=1).max(axis=1) / setting.preset.dt_s / speed
-        worst = max(worst, _worst(np.abs(returned - one)))
-    return {"elasticity": worst}
+        errors.append(np.abs(returned - one))
+    return {"elasticity": _worst(np.array(errors))}
 
 
-# Friction ------------------------------------------------------------------------------------
-
-SKID_SPEEDS_M_S: Final = (2.0, 4.0, 8.0)
-SKID_HEADINGS_DEG: Final = (0.0, 22.5, 45.0)
-
-
-def friction(setting: Setting) -> dict[str, float]:
+def friction(setting: Setting) -> Errors:
     """Throw balls along the ground without spin; friction sets them rolling, and makes them hop.
 
     A rigid ball ends at 5/7 of its speed v and is then v t / 7 ahead of one that began with that,
-    t = 2 v / (7 mu g) being how long it skids; so the friction is 2 v² / (49 g lead).
+    t = 2 v / (7 mu g) being how long it skids; so the friction is 2 v² / (49 g lead). The largest
+    errors of friction, of the last speed and of the heading; how high a ball of 4 m/s hops; and how
+    deep one lies half a second after it was put there.
     """
-    speed, degrees = (a.ravel() for a in np.meshgrid(SKID_SPEEDS_M_S, SKID_HEADINGS_DEG))
+    speed, degrees = _each([2.0, 4.0, 8.0], [0.0, 22.5, 45.0])
     angle = np.radians(degrees)
     way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    world = World(setting, make_level(), len(speed), 0.5)
-    world.position[:] = 0.0, 0.0, RADIUS_M
-    world.advance()
+    world = World(setting, game.make_level(), _over_ground(np.zeros(len(speed))))
+    world.advance(0.5)
     rest_m = RADIUS_M - float(world.position[0, 2])
     world.velocity[:, :2] = speed[:, None] * way
-    path, velocity = zip(*(world.advance() for _ in range(4)), strict=True)
-    place = np.concatenate([path[0], *(part[:, 1:] for part in path[1:])], axis=1)
-    speeds = np.concatenate([velocity[0], *(part[:, 1:] for part in velocity[1:])], axis=1)
-    along = np.einsum("nsd,nd->ns", speeds[:, :, :2], way)
+    place, velocity = world.advance(0.5, times=4)
+    along = np.einsum("nsd,nd->ns", velocity[:, :, :2], way)
     final = along[:, -1]
     # From the velocities, since the step's own error of the position is not friction's.
     lead = np.trapezoid(along - final[:, None], dx=setting.preset.dt_s, axis=1)
@@ -235,7 +199,7 @@ def friction(setting: Setting) -> dict[str, float]:
     turned = np.degrees(np.abs(np.arctan2(moved[:, 1], moved[:, 0]) - angle))
     hop = np.nanmax(place[:, :, 2], axis=1) - RADIUS_M
     return {
-        "friction": _worst(np.abs(measured - FRICTION)),
+        "friction": _worst(np.abs(measured - game.FRICTION)),
         "skid_speed": _worst(np.abs(final / (5.0 / 7.0 * speed) - 1.0)),
         "skid_heading_deg": _worst(turned),
         "hop_mm": 1e3 * _worst(hop[speed == 4.0]),
@@ -243,82 +207,63 @@ def friction(setting: Setting) -> dict[str, float]:
     }
 
 
-# The lift, the seams, the movers -------------------------------------------------------------
-
-
-def lift(setting: Setting) -> dict[str, float]:
+def lift(setting: Setting) -> Errors:
     """Throw the ball up as a lift pad does, and compare the rise with the closed form."""
-    world = World(setting, make_level(), 1, LIFT_S)
-    world.position[:] = 0.0, 0.0, RADIUS_M
+    world = World(setting, game.make_level(), _over_ground([0.0]))
     thrust = LIFT_N - GRAVITY_M_S2
     world.force(np.array([[0.0, 0.0, LIFT_N]]))
-    world.advance()
+    world.advance(LIFT_S)
     world.force(np.zeros((1, 3)))
-    apex = world.path()[0, :, 2].max() - RADIUS_M
+    apex = world.advance(LIFT_S)[0][0, :, 2].max() - RADIUS_M
     speed = thrust * LIFT_S
     exact = 0.5 * thrust * LIFT_S**2 + speed**2 / (2.0 * GRAVITY_M_S2)
     return {"lift": abs(float(apex) / exact - 1.0)}
 
 
-SEAM_SPEEDS_M_S: Final = (3.0, 6.0, 9.0, 12.0, 15.0)
-
-
-def seams(setting: Setting) -> dict[str, float]:
-    """Roll from classic's bridge over two seams onto the island, at 3 to 15 m/s."""
+def seams(setting: Setting) -> Errors:
+    """Roll from classic's bridge over two seams onto the island, at 3 to 15 m/s: highest bump."""
     level = load_level("classic")
-    speed, share = (a.ravel() for a in np.meshgrid(SEAM_SPEEDS_M_S, ARRIVALS[::3]))
-    world = World(setting, level, len(speed), quants(440.0) / max(SEAM_SPEEDS_M_S))
-    world.position[:, 0] = quants(660.0) + speed * setting.preset.dt_s * share
-    world.position[:, 1] = 0.0
-    world.position[:, 2] = level.start.at[2]
-    world.velocity[:, 0] = speed
-    world.spin[:, 1] = speed / RADIUS_M
-    parts = max(SEAM_SPEEDS_M_S) / min(SEAM_SPEEDS_M_S)
-    path = np.concatenate([world.path() for _ in range(round(parts))], axis=1)
+    speed, share = _each([3.0, 6.0, 9.0, 12.0, 15.0], ARRIVALS[::3])
+    begin = quants(660.0) + speed * setting.preset.dt_s * share
+    flat = np.zeros_like(speed)
+    world = World(setting, level, np.stack([begin, flat, flat + level.start.at[2]], axis=1))
+    world.roll(speed)
+    path, _ = world.advance(quants(440.0) / 15.0, times=5)
     on_course = path[:, :, 0] < quants(1180.0)
     settled = np.arange(path.shape[1]) * setting.preset.dt_s * speed[:, None] > 0.5
     height = np.where(on_course & settled, path[:, :, 2], -np.inf)
     return {"seam_mm": 1e3 * max(0.0, _worst(height.max(axis=1) - level.start.at[2]))}
 
 
-MOVED_S: Final = 0.3
+def movers(setting: Setting) -> Errors:
+    """Lower the gate level's plate and gate under a ball: do they keep the level's speed?
 
-
-def movers(setting: Setting) -> dict[str, float]:
-    """Lower the gate level's plate and gate under a ball: do they keep the level's speed?"""
-    level = load_level("gate")
-    wrong, ringing, deepest = 0.0, 0.0, 0.0
+    The largest relative error of the speed, how much it goes up and down once it is reached, and
+    how deep the ball is in what sinks under it.
+    """
+    level, found, moved_s = load_level("gate"), [], 0.3
     for piece, servo in ((level.plates[0], "plate"), (level.gates[0], "gate")):
-        world = World(setting, level, 1, MOVED_S)
-        compiled = world.compiled
-        at = (compiled.plate_qpos if servo == "plate" else compiled.gate_qpos)[0]
-        ctrl = (compiled.plate_ctrl if servo == "plate" else compiled.gate_ctrl)[0]
         top = piece.at[2] + piece.size[2] / 2 + RADIUS_M
-        world.position[:] = piece.at[0], piece.at[1], top
+        world = World(setting, level, [(piece.at[0], piece.at[1], top)])
+        (at,), (ctrl,) = (getattr(world.compiled, f"{servo}_{of}") for of in ("qpos", "ctrl"))
         world.ctrl[:, ctrl] = -piece.speed
-        world.advance()
-        before = float(world.qpos[0, at])
-        path = world.path()
+        world.advance(moved_s)
+        before = float(world.went[0, -1, at])
+        path, _ = world.advance(moved_s)
         moved = world.went[0, :, at]
-        wrong = max(wrong, abs((before - float(moved[-1])) / (MOVED_S * piece.speed) - 1.0))
-        speeds = np.diff(moved) / setting.preset.dt_s / piece.speed
-        ringing = max(ringing, float(np.ptp(speeds)))
-        deepest = max(deepest, top + float(moved[-1]) - float(path[0, -1, 2]))
-    return {"movers": wrong, "ringing": ringing, "carried_mm": 1e3 * deepest}
+        wrong = abs((before - float(moved[-1])) / (moved_s * piece.speed) - 1.0)
+        ringing = float(np.ptp(np.diff(moved) / setting.preset.dt_s / piece.speed))
+        found.append((wrong, ringing, 1e3 * (top + float(moved[-1]) - float(path[0, -1, 2]))))
+    worst = np.max([(0.0, 0.0, 0.0), *found], axis=0).tolist()
+    return dict(zip(("movers", "ringing", "carried_mm"), worst, strict=True))
 
 
-SQUEEZE_S: Final = 2.5
-SQUEEZED_AT_M: Final = (0.0, 0.15, 0.3, 0.45)
-"""From the middle of the gate."""
-
-
-def squeeze(setting: Setting) -> dict[str, float]:
-    """Let a hanging gate come down on the ball, which has nowhere to go."""
-    compiled = setting.compile(hanging_gate_level(0.0))
-    runs = [
-        play(Course(compiled, (x, 0.0, RADIUS_M), movers_m_s=-GATE_SPEED_M_S), SQUEEZE_S)
-        for x in SQUEEZED_AT_M
-    ]
+def squeeze(setting: Setting) -> Errors:
+    """Let a hanging gate come down on the ball, which has nowhere to go: the deepest contact."""
+    compiled, down = setting.compile(hanging_gate_level(0.0)), -game.GATE_SPEED_M_S
+    # So far from the middle of the gate.
+    places = [(x, 0.0, RADIUS_M) for x in (0.0, 0.15, 0.3, 0.45)]
+    runs = [game.play(game.Course(compiled, at, movers_m_s=down), 2.5) for at in places]
     return {"squeeze_mm": 1e3 * max(float(run.depth.max()) for run in runs)}
 
 
@@ -326,28 +271,23 @@ LANE_SPEEDS_M_S: Final = np.linspace(7.5, 15.0, 76)
 """Some of them keep time with the seams, and bumps grow from one to the next."""
 
 
-def lane(setting: Setting) -> dict[str, float]:
+def lane(setting: Setting) -> Errors:
     """Roll over 49 seams in a row, which two materials keep the compiler from merging.
 
     The highest bump is that of the speed nearest to a resonance, and grows with the speeds that are
-    tried: ``default``'s is 25 mm of 31 and 52 mm of 301. What share of them is thrown does not.
+    tried: ``default``'s is 25 mm of 31 and 52 mm of 301. What share of them is thrown, by more than
+    one quant, does not.
     """
-    speed = LANE_SPEEDS_M_S
-    world = World(setting, seam_level(seams=True), len(speed), 0.5)
-    world.position[:] = 0.0, 0.0, RADIUS_M
-    world.velocity[:, 0] = speed
-    world.spin[:, 1] = speed / RADIUS_M
-    path = np.concatenate([world.path() for _ in range(10)], axis=1)
-    bumps = np.where(path[:, :, 0] < LANE_M, path[:, :, 2] - RADIUS_M, 0.0).max(axis=1)
+    world = World(setting, seam_level(seams=True), _over_ground(np.zeros(len(LANE_SPEEDS_M_S))))
+    world.roll(LANE_SPEEDS_M_S)
+    path, _ = world.advance(0.5, times=10)
+    bumps = np.where(path[:, :, 0] < 80.0, path[:, :, 2] - RADIUS_M, 0.0).max(axis=1)
     thrown = ~(bumps <= quants(1.0))
     return {"lane_mm": 1e3 * _worst(bumps), "lane_share": float(thrown.mean())}
 
 
-# The course ----------------------------------------------------------------------------------
-
-COURSE_S: Final = 3.0
 CONTROL_DT_S: Final = 0.05
-COURSES: Final[tuple[tuple[tuple[str, float], ...], ...]] = (
+COURSES: Final = (
     (("w", 1.5), ("wa", 0.5), ("a", 0.5), ("s", 0.5)),
     (("wa", 1.0), ("wd", 1.5), ("w", 0.5)),
     (("wd", 1.5), ("a", 1.5)),
@@ -366,12 +306,12 @@ both 4e-4 of the way from it. Contacts go with the step and approach a rigid bal
 
 @cache
 def recordings() -> tuple[tuple[Float64, Float64], ...]:
-    """Play `COURSES` on the classic level with ``accurate`` physics; see `played`."""
+    """Play `COURSES` on the classic level with ``accurate`` physics; see `game.played`."""
     config = EnvConfig(level="classic", physics="accurate", control_dt_s=CONTROL_DT_S)
-    return tuple(played(config, keys, seed) for seed, keys in enumerate(COURSES))
+    return tuple(game.played(config, keys, seed) for seed, keys in enumerate(COURSES))
 
 
-def course(setting: Setting, reference_hz: int = REFERENCE_HZ) -> dict[str, float]:
+def course(setting: Setting, reference_hz: int = REFERENCE_HZ) -> Errors:
     """Play recorded keys on the classic level, against the converged model, for three seconds.
 
     The error is the mean over the way's time of the distance between the two, as a share of the
@@ -387,12 +327,11 @@ def course(setting: Setting, reference_hz: int = REFERENCE_HZ) -> dict[str, floa
 def course_paths(setting: Setting) -> Float64:
     """Return where the ball is after every control step, (courses, steps + 1, 3) m."""
     starts, controls = zip(*recordings(), strict=True)
-    world = World(setting, load_level("classic"), len(starts), CONTROL_DT_S)
-    world.position[:] = starts
+    world = World(setting, load_level("classic"), starts)
     places = [world.position.copy()]
     for ctrl in zip(*controls, strict=True):
         world.ctrl[:] = ctrl
-        places.append(world.path()[:, -1])
+        places.append(world.advance(CONTROL_DT_S)[0][:, -1])
     return np.stack(places, axis=1)
 
 
@@ -402,49 +341,9 @@ def _converged_paths(steps_per_s: int) -> Float64:
     return course_paths(Setting("converged", "reference", preset))
 
 
-def _worst(values: Float64) -> float:
-    """Return the largest, infinite where any is not finite."""
-    return float(values.max()) if np.isfinite(values).all() else math.inf
-
-
-Errors = dict[str, float]
-"""What one setting gets wrong, by the names of `MEANINGS`."""
-
-MEANINGS: Final = {
-    "path": "distance from a rigid ball's place after 5 s of driving over the way rolled; worst of "
-    "twelve sequences of keys",
-    "heading_deg": "largest error of the direction in which keys push, of all eight",
-    "landing_share": "depth of the landing after 46.9 m over that at which a ball falls through",
-    "fastest_share": "the same for 36 m/s",
-    "tunnels_at_m_s": "least speed tried at which a ball passes a deck of 16 quants; or infinite",
-    "elasticity": "largest error of the coefficient of restitution, of five and at seven speeds",
-    "friction": "largest error of the coefficient of friction, measured on skids",
-    "skid_speed": "largest relative error of the speed at which a skid ends",
-    "skid_heading_deg": "largest bend of a skid's way",
-    "hop_mm": "highest that a ball skidding at 4 m/s hops",
-    "rest_mm": "how deep a ball lies in the ground half a second after it was put there",
-    "lift": "relative error of the height to which a lift pad throws",
-    "seam_mm": "highest bump at a seam of classic's bridge, at 3 to 15 m/s",
-    "movers": "largest relative error of the speed of a plate or gate under the ball",
-    "ringing": "how much that speed goes up and down once it is reached, over the speed",
-    "carried_mm": "how deep the ball is in what sinks under it",
-    "squeeze_mm": "deepest contact while a hanging gate presses on the ball",
-    "lane_mm": "highest bump on a lane of 49 seams that cannot be merged, at 7.5 to 15 m/s",
-    "lane_share": "of these speeds, the share at which that bump is over one quant",
-    "course": "distance from the converged model's place on the classic course over the way",
-}
-
-
-_MEASURES: Final[Sequence[Callable[[Setting], dict[str, float]]]] = (
-    driving,
-    landing,
-    elasticity,
-    friction,
-    lift,
-    seams,
-    movers,
-    squeeze,
-    lane,
+_MEASURES: Final = (
+    *(driving, landing, elasticity, friction),
+    *(lift, seams, movers, squeeze, lane),
 )
 
 
@@ -456,56 +355,39 @@ def errors_of(setting: Setting, reference_hz: int = REFERENCE_HZ) -> Errors:
     return values
 
 
-@dataclass(frozen=True, slots=True)
-class Requirement:
-    """What the game can bear.
+class Requirement(NamedTuple):
+    """What the game can bear."""
 
-    Attributes:
-        name: in `MEANINGS`.
-        label: for tables and charts; after a comma the unit.
-        limit: largest bearable value.
-        reason: why that.
-    """
-
-    name: str
-    label: str
-    limit: float
+    name: str  # in `Errors`
+    title: str  # for tables and charts
+    limit: float  # largest bearable value
     reason: str
-
-    @property
-    def title(self) -> str:
-        """The label without its unit."""
-        return self.label.partition(", ")[0]
-
-    @property
-    def unit(self) -> str:
-        """Of the limit; empty for shares."""
-        return self.label.partition(", ")[2]
+    unit: str = ""  # of the limit; empty for shares
 
 
 _ASKED: Final = "asked of the default preset"
+_AS_PATH: Final = "as for the path"
 _FALLS: Final = "deeper, it falls through"
-_NOT_SEEN: Final = "a fiftieth of the radius is not seen"
+_NOT_SEEN: Final = (1e3 * RADIUS_M / 50, "a fiftieth of the radius is not seen", "mm")
+
 REQUIREMENTS: Final = (
     Requirement("path", "path after 5 s of driving", 0.01, _ASKED),
-    Requirement("heading_deg", "heading of the keys, °", 0.5, _ASKED),
+    Requirement("heading_deg", "heading of the keys", 0.5, _ASKED, "°"),
     Requirement("landing_share", "landing from 46.9 m", 1.0, _FALLS),
     Requirement("fastest_share", "landing at 36 m/s", 1.0, _FALLS),
     Requirement("elasticity", "elasticity", 0.02, _ASKED),
     Requirement("friction", "friction", 0.02, _ASKED),
-    Requirement("skid_speed", "speed after a skid", 0.01, "as for the path"),
-    Requirement("skid_heading_deg", "bend of a skid, °", 0.5, "as for the keys"),
-    Requirement("rest_mm", "depth at rest, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
-    Requirement("lift", "height of the lift", 0.01, "as for the path"),
-    Requirement("seam_mm", "bump of a seam, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
-    Requirement("movers", "speed of plate and gate", 0.01, "as for the path"),
-    Requirement("ringing", "ringing of plate and gate", 0.01, "as for the path"),
-    Requirement("carried_mm", "depth on plate and gate, mm", 1e3 * RADIUS_M / 50, _NOT_SEEN),
-    Requirement(
-        "squeeze_mm", "depth under a gate, mm", 1e3 * THROUGH_M, "deeper, it falls through"
-    ),
+    Requirement("skid_speed", "speed after a skid", 0.01, _AS_PATH),
+    Requirement("skid_heading_deg", "bend of a skid", 0.5, "as for the keys", "°"),
+    Requirement("rest_mm", "depth at rest", *_NOT_SEEN),
+    Requirement("lift", "height of the lift", 0.01, _AS_PATH),
+    Requirement("seam_mm", "bump of a seam", *_NOT_SEEN),
+    Requirement("movers", "speed of plate and gate", 0.01, _AS_PATH),
+    Requirement("ringing", "ringing of plate and gate", 0.01, _AS_PATH),
+    Requirement("carried_mm", "depth on plate and gate", *_NOT_SEEN),
+    Requirement("squeeze_mm", "depth under a gate", 1e3 * THROUGH_M, _FALLS, "mm"),
     Requirement("lane_share", "thrown by a lane of seams", 0.1, "one speed in ten"),
-    Requirement("course", "course of classic", 0.01, "as for the path"),
+    Requirement("course", "course of classic", 0.01, _AS_PATH),
 )
 """The hop of a skid has no limit here, since what cures it costs the course; see the docs."""
 
