@@ -117,10 +117,15 @@ second."""
 RIGID: Final = PhysicsPreset("rigid", dt_s=1 / 240, engine="rigid")
 """The rigid-ball engine: exact impacts and rolling, no softness, many times cheaper."""
 
-PRESETS: Final[dict[str, PhysicsPreset]] = {
-    preset.name: preset for preset in (FAST, DEFAULT, ACCURATE, RIGID)
+MUJOCO_PRESETS: Final[dict[str, PhysicsPreset]] = {
+    preset.name: preset for preset in (FAST, DEFAULT, ACCURATE)
 }
-"""By name. Their errors and costs are from ``python scripts/presets.py``; see docs/presets.md."""
+"""Those of MuJoCo, by name. Their errors and costs are from ``python scripts/presets.py``; see
+docs/presets.md."""
+
+
+PRESETS: Final[dict[str, PhysicsPreset]] = {**MUJOCO_PRESETS, RIGID.name: RIGID}
+"""All that the option ``physics`` knows by name."""
 
 
 def physics_preset(physics: str | PhysicsPreset) -> PhysicsPreset:

@@ -35,14 +35,14 @@ from roller_env.lab.presets.errors import (
 from roller_env.lab.presets.report import front
 from roller_env.lab.presets.settings import FEW, SETTINGS, Setting, set_flag
 from roller_env.level import load_level
-from roller_env.physics.presets import PRESETS
+from roller_env.physics.presets import MUJOCO_PRESETS
 from scripts import presets as script
 
 COARSE_HZ = 1920
 """Of the converged model in tests: it is 4e-4 of the way from the published one."""
 
 
-@pytest.fixture(scope="module", params=PRESETS)
+@pytest.fixture(scope="module", params=MUJOCO_PRESETS)
 def of_preset(request: pytest.FixtureRequest) -> tuple[str, Errors]:
     return request.param, errors_of(SETTINGS[request.param], COARSE_HZ)
 

@@ -26,7 +26,7 @@ from roller_env.lab.stability.hard_cases import HARD_CASES, READERS, REQUIREMENT
 from roller_env.lab.stability.limits import FULL, QUICK, WORDS
 from roller_env.lab.stability.run import CASES
 from roller_env.lab.table import frame
-from roller_env.physics.presets import PRESETS
+from roller_env.physics.presets import MUJOCO_PRESETS
 from roller_env.units import quants
 
 KNOWN_TO_FAIL = {
@@ -41,7 +41,7 @@ KNOWN_TO_FAIL = {
 @pytest.mark.parametrize("name", HARD_CASES)
 def test_a_hard_case_of_the_game_is_within_what_is_acceptable(name: str) -> None:
     found = hard_cases.rows(name, QUICK)
-    assert {row["preset"] for row in found} == set(PRESETS)
+    assert {row["preset"] for row in found} == set(MUJOCO_PRESETS)
     failing = {
         (row["case"], row["preset"], row["quantity"]) for row in found if row["verdict"] == "fails"
     }

@@ -26,7 +26,7 @@ from roller_env.lab.game import played
 from roller_env.lab.methods import MujocoMethod
 from roller_env.lab.simulate import Path
 from roller_env.level import load_level
-from roller_env.physics.presets import PRESETS
+from roller_env.physics.presets import MUJOCO_PRESETS
 
 CONTROL_DT_S: Final = 0.05
 """Between changes of the keys: the environments' default."""
@@ -44,7 +44,7 @@ class GameScene(scene.BallScene):
     level: str = "classic"
 
     def _world(self, method: MujocoMethod, dt_s: float) -> mujoco.MjSpec:
-        spec = build_spec(_compiled(self.level).level, PRESETS["default"])
+        spec = build_spec(_compiled(self.level).level, MUJOCO_PRESETS["default"])
         method.configure(spec, dt_s)
         for name, value in scene.CONVERGED.items():
             setattr(spec.option, name, value)

@@ -22,7 +22,7 @@ from roller_env.lab.methods import MUJOCO, Cone, Method, MujocoMethod, without_w
 from roller_env.lab.scene import Measure
 from roller_env.lab.simulate import Float64, Path, record
 from roller_env.physics.materials import IMPEDANCE, contact_parameters
-from roller_env.physics.presets import PRESETS, PhysicsPreset
+from roller_env.physics.presets import MUJOCO_PRESETS, PhysicsPreset
 
 CONVERGED: Final[Mapping[str, float]] = {"iterations": 100, "tolerance": 1e-14}
 """Solver options with which no error of its own is taken for one of the integrator's."""
@@ -86,7 +86,7 @@ def contact_of(
 def game_contact(
     friction: float = FRICTION,
     elasticity: float = 0.0,
-    preset: PhysicsPreset = PRESETS["default"],
+    preset: PhysicsPreset = MUJOCO_PRESETS["default"],
 ) -> dict[str, Any]:
     """Return a geom's contact as the product calibrates it for a preset, however it is stepped."""
     parameters = contact_parameters(friction, elasticity, preset)

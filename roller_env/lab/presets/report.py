@@ -22,7 +22,7 @@ from roller_env.lab.presets.settings import FEW, SETTINGS
 from roller_env.lab.runner import header
 from roller_env.lab.table import Frame, markdown
 from roller_env.level import load_level
-from roller_env.physics.presets import PRESETS
+from roller_env.physics.presets import MUJOCO_PRESETS
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +158,7 @@ def tables(settings: Frame, ablations: Frame) -> str:
         for one in REQUIREMENTS
     ]
     parts = [
-        _settings_table(settings[settings.setting.isin(list(PRESETS))]),
+        _settings_table(settings[settings.setting.isin(list(MUJOCO_PRESETS))]),
         f"<details><summary>All {len(settings)} settings, the cheapest first</summary>\n",
         _settings_table(settings),
         "</details>\n",
@@ -179,7 +179,7 @@ def _settings_table(settings: Frame) -> str:
 def summary(settings: Frame, ablations: Frame) -> list[str]:
     """Return what a run found, a line each."""
     lines = []
-    for row in settings[settings.setting.isin(list(PRESETS))].itertuples():
+    for row in settings[settings.setting.isin(list(MUJOCO_PRESETS))].itertuples():
         state = f"violates {row.violations}" if row.violations else "meets every requirement"
         place = "on the front" if row.front else "not on the front"
         lines.append(
@@ -222,7 +222,7 @@ def draw_front(settings: Frame) -> Figure:
     rows = settings.assign(
         ms=1e3 * settings.cpu_s_per_s,
         percent=(100.0 * settings.course).clip(*_SHOWN_PERCENT),
-        preset=settings.setting.isin(list(PRESETS)),
+        preset=settings.setting.isin(list(MUJOCO_PRESETS)),
     )
     front = rows[rows.front].sort_values("ms")
     axes.plot(front.ms, front.percent, lw=9, color=chart.PARETO, zorder=1, label="Pareto front")
@@ -264,7 +264,7 @@ _COLOURS: Final = LinearSegmentedColormap.from_list(
 @chart.styled
 def draw_requirements(settings: Frame) -> Figure:
     """Draw each setting's errors as shares of what the game can bear."""
-    first = settings.setting.isin(list(PRESETS))
+    first = settings.setting.isin(list(MUJOCO_PRESETS))
     order = settings.loc[[*settings.index[first], *settings.index[~first]]]
     shares = np.stack([order[one.name] / one.limit for one in REQUIREMENTS], axis=1)
     figure, ((axes,),) = chart.grid(

@@ -14,11 +14,11 @@ import mujoco
 from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.compile.mjcf import BALL, build_spec
 from roller_env.level import Level
-from roller_env.physics.presets import PRESETS, PhysicsPreset
+from roller_env.physics.presets import MUJOCO_PRESETS, PhysicsPreset
 
-DEFAULT: Final = PRESETS["default"]
-FAST: Final = PRESETS["fast"]
-RK4: Final = PRESETS["accurate"]
+DEFAULT: Final = MUJOCO_PRESETS["default"]
+FAST: Final = MUJOCO_PRESETS["fast"]
+RK4: Final = MUJOCO_PRESETS["accurate"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ _SPECULATIVE: Final = {"speculative": True, "midphase": True}
 SETTINGS: Final[dict[str, Setting]] = {
     one.name: one
     for one in (
-        *(Setting(name, "presets", preset) for name, preset in PRESETS.items()),
+        *(Setting(name, "presets", preset) for name, preset in MUJOCO_PRESETS.items()),
         *(Setting(f"1/{hz}", "time step", _rate(hz)) for hz in (60, 80, 480, 960)),
         *(Setting(f"RK4 1/{hz}", "RK4", _rate(hz, RK4)) for hz in (60, 120, 240, 480)),
         Setting("Euler", "integrator", options=_EULER),

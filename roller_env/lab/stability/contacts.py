@@ -20,7 +20,7 @@ from roller_env.lab.simulate import Start, record, settled, started, stays
 from roller_env.lab.stability.limits import Case, Effort, Limit, Quantity
 from roller_env.lab.stability.smooth import damping_limit, rk4_servo_limit
 from roller_env.physics.materials import DAMPING_STEPS
-from roller_env.physics.presets import PRESETS, PhysicsPreset
+from roller_env.physics.presets import MUJOCO_PRESETS, PhysicsPreset
 
 EULER, _, IMPLICITFAST, DISCRETE, RK4 = MUJOCO
 
@@ -301,7 +301,7 @@ def soft_friction_model(preset: PhysicsPreset, share: float) -> mujoco.MjModel:
 
 
 def _hop(dt_s: float, share: float | None, _effort: Effort) -> float:
-    preset = replace(PRESETS["default"], dt_s=dt_s)
+    preset = replace(MUJOCO_PRESETS["default"], dt_s=dt_s)
     if share is None:
         model = compile_level(game.make_level(), preset).model
     else:

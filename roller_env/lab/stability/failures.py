@@ -27,10 +27,10 @@ from roller_env.lab.stability.contacts import EULER, SETTLE_S, TAU_S, WALL_M, ba
 from roller_env.lab.stability.limits import words
 from roller_env.level import Level, load_level
 from roller_env.physics.materials import contact_parameters, restitution
-from roller_env.physics.presets import PRESETS, PhysicsPreset
+from roller_env.physics.presets import MUJOCO_PRESETS, PhysicsPreset
 from roller_env.units import quants
 
-DEFAULT: Final = PRESETS["default"]
+DEFAULT: Final = MUJOCO_PRESETS["default"]
 
 WORDS: Final = words("failures", after_s=-1.0)
 
@@ -183,7 +183,7 @@ def bent_heading() -> Failure:
 
 def restitution_gain() -> Failure:
     """Return a bouncy contact that gives back more than it got."""
-    ratio, drop, fast, gravity = 0.1, 0.24, PRESETS["fast"], contacts.GRAVITY
+    ratio, drop, fast, gravity = 0.1, 0.24, MUJOCO_PRESETS["fast"], contacts.GRAVITY
     direct = contact_parameters(0.3, restitution(ratio), fast)
 
     def setting(label: str, **contact: Any) -> Setting:
@@ -239,7 +239,7 @@ def hop() -> Failure:
         default,
         Setting("friction's own damper, B h = 0.3", soft, default.prepare),
         _skid("RK4, 1/240 s", replace(DEFAULT, integrator="RK4")),
-        _skid("accurate: RK4, 1/960 s", PRESETS["accurate"]),
+        _skid("accurate: RK4, 1/960 s", MUJOCO_PRESETS["accurate"]),
     )
 
 

@@ -22,7 +22,7 @@ from roller_env.lab.game import GATE_SPEED_M_S, RADIUS_M, Course, Run
 from roller_env.lab.stability.failures import gate_level, hanging_gate_level, seam_level
 from roller_env.lab.stability.limits import Effort
 from roller_env.level import load_level
-from roller_env.physics.presets import PRESETS, PhysicsPreset
+from roller_env.physics.presets import MUJOCO_PRESETS, PhysicsPreset
 from roller_env.units import quants
 
 REQUIREMENTS: Final = read_csv(Path(__file__).with_suffix(".csv")).fillna({"note": ""})
@@ -202,7 +202,7 @@ def rows(name: str, effort: Effort) -> list[dict[str, Any]]:
     whether that is ``good``.
     """
     found = []
-    for preset in PRESETS.values():
+    for preset in MUJOCO_PRESETS.values():
         starts = HARD_CASES[name](preset, effort.starts)
         runs = [game.play(course, seconds) for course, seconds in starts]
         for row in REQUIREMENTS[REQUIREMENTS.case == name].to_dict("records"):
