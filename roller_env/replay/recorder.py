@@ -156,7 +156,7 @@ class Recorder:
             actions=recorded_actions(simulation.config.action, force_n),
             checksums=Checksums(self._every, _NAMES, np.array(sums)),
             result=simulation.result(row),
-            versions=Versions.here(),
+            versions=Versions.here(simulation.preset.engine),
             player=self._player,
             seed=take.seed,
         )
