@@ -17,12 +17,10 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Float64
 from roller_env.level.schema import Level
 from roller_env.physics.presets import PhysicsPreset
-
-Float64 = npt.NDArray[np.float64]
 
 REPORTS_VARIABLE: Final = "ROLLER_REPORTS"
 """Environment variable that names the directory for reports."""

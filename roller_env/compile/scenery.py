@@ -15,8 +15,8 @@ from typing import Any, Final
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Float64
 from roller_env.compile import textures
 from roller_env.compile.merge import merge_solids
 from roller_env.compile.mjcf import BALL, build_spec, machine_name, quaternion
@@ -26,8 +26,6 @@ from roller_env.physics.presets import PhysicsPreset
 from roller_env.pieces.look import METAL, Fly, Paint, Shape, part
 from roller_env.pieces.piece import Solid
 from roller_env.pieces.surfaces import Surface, box_surfaces
-
-Float64 = npt.NDArray[np.float64]
 
 _HIDDEN_GROUP: Final = 4
 """Geoms of the physics that a surface is drawn for; MuJoCo leaves this group out by default."""

@@ -7,9 +7,9 @@ from typing import Final, Literal
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
-Float64 = npt.NDArray[np.float64]
+from roller_env.arrays import Float64
+
 Colour = tuple[float, float, float]
 
 TILE_PIXELS: Final = 256

@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Bool, Float64, Int64
 from roller_env.compile.scenery import build_scenery
 from roller_env.game.cameras import MODE_BELOW, MODE_FIRST_PERSON
 from roller_env.game.state import GameState
@@ -23,10 +23,6 @@ from roller_env.physics.presets import PhysicsPreset
 from roller_env.pieces.coin import COIN, coin_shapes
 from roller_env.pieces.look import Fly, Run, Shape, Spin, part
 from roller_env.pieces.piece import Mover, Piece, number_of
-
-Bool = npt.NDArray[np.bool_]
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 SUN_DISTANCE_M: Final = 30.0
 

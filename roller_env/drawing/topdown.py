@@ -9,18 +9,17 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from roller_env.arrays import Float64
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
 from roller_env.pieces.look import METAL
 from roller_env.pieces.piece import Solid
 
-Float64 = npt.NDArray[np.float64]
 Colour = tuple[float, float, float, float]
 
 STOREY_GAP_M: Final = 4.0

@@ -11,9 +11,9 @@ from typing import Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.arrays import Float64
 from roller_env.units import quants
 
-Float64 = npt.NDArray[np.float64]
 ActionMode = Literal["directions", "keys", "force"]
 
 KEY_FORCE_N: Final = quants(200.0)

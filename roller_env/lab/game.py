@@ -9,10 +9,11 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
+from roller_env.arrays import Float64
 from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.config import EnvConfig
 from roller_env.game.actions import forces, held_keys
-from roller_env.lab.simulate import Float64, record, started
+from roller_env.lab.simulate import record, started
 from roller_env.level import Level, load_level
 from roller_env.simulation import Simulation
 from roller_env.units import quants

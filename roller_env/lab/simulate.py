@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
-Float64 = npt.NDArray[np.float64]
+from roller_env.arrays import Float64
+
 Start = Callable[[mujoco.MjData], None]
 """Puts freshly reset data where a motion begins."""
 

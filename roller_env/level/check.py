@@ -11,10 +11,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from roller_env.arrays import Float64
 from roller_env.level.expand import expand
 from roller_env.level.schema import BUILT_IN_MATERIALS, MAX_PIECES, PIECE_FIELDS, Level
 from roller_env.pieces.coin import MAX_COINS
-from roller_env.pieces.piece import TOUCHING_M, Float64, Solid, path_of, rotation_matrix
+from roller_env.pieces.piece import TOUCHING_M, Solid, path_of, rotation_matrix
 from roller_env.pieces.space import MAX_SAMPLES, inside, samples
 from roller_env.pieces.surroundings import Surroundings
 from roller_env.pieces.words import InUnit, Unit, coin_groups

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from roller_env.arrays import Float64
 from roller_env.pieces.coin import coin_shapes
 from roller_env.pieces.look import Shape
-from roller_env.pieces.piece import ExpandedLevel, Float64, Mover, Piece, Region, Solid, number_of
+from roller_env.pieces.piece import ExpandedLevel, Mover, Piece, Region, Solid, number_of
 
 if TYPE_CHECKING:
     from roller_env.level.schema import Level

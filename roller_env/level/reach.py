@@ -16,14 +16,15 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from roller_env.arrays import Bool, Float64
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
 from roller_env.pieces.coin import COIN_REACH_M
 from roller_env.pieces.finish import Finish
 from roller_env.pieces.lift_pad import LiftPad, pad_groups
-from roller_env.pieces.piece import Float64, Region, Solid
+from roller_env.pieces.piece import Region, Solid
 from roller_env.pieces.plate import Plate
-from roller_env.pieces.spans import EDGE, SLOPE, Bool, Indices, Spans, free_spans
+from roller_env.pieces.spans import EDGE, SLOPE, Indices, Spans, free_spans
 
 _CLIMB: Final = 0.9
 """How far, in radii, the ball's centre may rise from one column to the next while it rolls: that of

@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
 
+from roller_env.arrays import Float64
 from roller_env.forks import never_freed
 from roller_env.physics.log_file import no_log_file
 from roller_env.physics.profiler import profiler_off
 
-Float64 = npt.NDArray[np.float64]
 Rows = npt.NDArray[np.int64]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from roller_env.arrays import Float64
 from roller_env.pieces.fields import (
     MaterialName,
     NonNegativeLength,
@@ -19,7 +20,7 @@ from roller_env.pieces.fields import (
     Point,
     PositiveLength,
 )
-from roller_env.pieces.piece import UNTURNED, Count, Float64, Piece, Solid
+from roller_env.pieces.piece import UNTURNED, Count, Piece, Solid
 from roller_env.problems import FieldPath
 from roller_env.units import quants
 

@@ -10,7 +10,8 @@ from typing import Final, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.pieces.piece import Float64, Piece, Solid
+from roller_env.arrays import Float64
+from roller_env.pieces.piece import Piece, Solid
 from roller_env.units import METRES_PER_QUANT, quants
 
 BESIDE_M: Final = quants(16.0)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self, TypeVa
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.arrays import Float64
 from roller_env.pieces.fields import Part
 from roller_env.problems import FieldPath, Problem
 from roller_env.units import SCRIPT_RATE_HZ
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from roller_env.pieces.rules import Rules
     from roller_env.pieces.surroundings import Surroundings
 
-Float64 = npt.NDArray[np.float64]
 Matrix = tuple[tuple[float, float, float], ...]
 Vector = tuple[float, float, float]
 

@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.pieces.piece import TOUCHING_M, Float64, Solid
+from roller_env.arrays import Bool, Float64
+from roller_env.pieces.piece import TOUCHING_M, Solid
 
-Bool = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
 
 MAX_SAMPLES: Final = 65

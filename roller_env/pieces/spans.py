@@ -13,10 +13,10 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from roller_env.pieces.piece import Float64, Solid
+from roller_env.arrays import Bool, Float64
+from roller_env.pieces.piece import Solid
 
 Indices = npt.NDArray[np.intp]
-Bool = npt.NDArray[np.bool_]
 
 EDGE, FLAT, SLOPE = 0, 1, 2
 """What a ball rests on: an edge, a level face, a tilted face."""

@@ -13,13 +13,10 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from roller_env.arrays import Float64, Int64
 from roller_env.pieces.piece import Solid
 from roller_env.units import quants
-
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 TILE_M: Final = quants(64.0)
 """Edge of the square of the world that one repetition of a texture covers."""

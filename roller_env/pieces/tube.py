@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from roller_env.arrays import Float64
 from roller_env.pieces.fields import (
     MIN_LENGTH_M,
     Degrees,
@@ -21,7 +22,7 @@ from roller_env.pieces.fields import (
     PositiveLength,
 )
 from roller_env.pieces.look import LIGHT, Paint, Run, Shape, part
-from roller_env.pieces.piece import Count, Float64, Piece, Solid
+from roller_env.pieces.piece import Count, Piece, Solid
 from roller_env.pieces.surfaces import Surface, full_turn, lathe
 from roller_env.problems import FieldPath, Problem
 from roller_env.units import quants

@@ -9,8 +9,9 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.arrays import Float64
 from roller_env.pieces.fields import METRES_PER_UNIT
-from roller_env.pieces.piece import Float64, path_of
+from roller_env.pieces.piece import path_of
 from roller_env.problems import FieldPath
 
 Unit = Literal["metre", "quant"]

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from pandas import read_csv
 
+from roller_env.arrays import Float64
 from roller_env.lab.contact.simbenchmark import (
     BOUNCING,
     DROPPED_PILE,
@@ -22,7 +23,7 @@ from roller_env.lab.contact.simbenchmark import (
     squared_penetration,
 )
 from roller_env.lab.methods import MujocoMethod
-from roller_env.lab.simulate import Float64, Path
+from roller_env.lab.simulate import Path
 
 EULER = MujocoMethod("Euler")
 

@@ -17,7 +17,6 @@ from typing import Any, Final
 import gymnasium as gym
 import mujoco
 import numpy as np
-import numpy.typing as npt
 import torch
 from gymnasium.vector import AutoresetMode
 from mujoco.batch import Batch
@@ -25,6 +24,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
+from roller_env.arrays import Float64, Int64
 from roller_env.compile.compiled import compile_level
 from roller_env.config import make_config
 from roller_env.envs.sb3 import RollerVecEnv
@@ -38,9 +38,6 @@ from roller_env.physics.stepper import keeps_poses
 from roller_env.simulation import Simulation
 from roller_env.training.config import TrainingConfig
 from roller_env.training.ppo import make_environments, new_model
-
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 SEED: Final = 0
 STATE: Final = mujoco.mjtState.mjSTATE_INTEGRATION

@@ -14,10 +14,11 @@ import mujoco
 import numpy as np
 from scipy.optimize import brentq
 
+from roller_env.arrays import Float64
 from roller_env.lab.contact import scene
 from roller_env.lab.game import GRAVITY_M_S2, MASS_KG, RADIUS_M
 from roller_env.lab.methods import MujocoMethod
-from roller_env.lab.simulate import Float64, Path
+from roller_env.lab.simulate import Path
 from roller_env.physics.materials import IMPEDANCE, damping_ratio
 from roller_env.physics.presets import PhysicsPreset
 

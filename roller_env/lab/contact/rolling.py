@@ -18,11 +18,12 @@ from typing import Any, Final
 import mujoco
 import numpy as np
 
+from roller_env.arrays import Float64
 from roller_env.game.actions import KEY_FORCE_N
 from roller_env.lab.contact import scene
 from roller_env.lab.game import FRICTION, GRAVITY_M_S2, MASS_KG, RADIUS_M
 from roller_env.lab.methods import MUJOCO, PYRAMIDAL, Method, MujocoMethod
-from roller_env.lab.simulate import Float64, Path
+from roller_env.lab.simulate import Path
 
 IMPRATIO: Final = 10.0
 """The game has 1; the soft contact here is four times as slow as its own, and its creep would hide

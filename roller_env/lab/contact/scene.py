@@ -17,10 +17,11 @@ import mujoco
 import numpy as np
 from pandas import read_csv
 
+from roller_env.arrays import Float64
 from roller_env.lab.game import FRICTION
 from roller_env.lab.methods import MUJOCO, Cone, Method, MujocoMethod, without_warnings
 from roller_env.lab.scene import Measure
-from roller_env.lab.simulate import Float64, Path, record
+from roller_env.lab.simulate import Path, record
 from roller_env.physics.materials import IMPEDANCE, contact_parameters
 from roller_env.physics.presets import MUJOCO_PRESETS, PhysicsPreset
 

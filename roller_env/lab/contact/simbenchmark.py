@@ -31,10 +31,11 @@ import mujoco
 import numpy as np
 from scipy.spatial.distance import pdist
 
+from roller_env.arrays import Float64
 from roller_env.lab.contact import scene
 from roller_env.lab.contact.impact import calibrated
 from roller_env.lab.methods import MUJOCO, PYRAMIDAL, Method, MujocoMethod
-from roller_env.lab.simulate import Float64, Path
+from roller_env.lab.simulate import Path
 
 GRAVITY_M_S2: Final = 9.81
 """SimBenchmark's, unlike the game's."""

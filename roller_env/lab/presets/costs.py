@@ -14,12 +14,12 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from roller_env.arrays import Float64
 from roller_env.game.actions import KEY_FORCE_N
 from roller_env.lab import runner
 from roller_env.lab.benchmark.scale import level_of_boxes
 from roller_env.lab.presets.settings import Setting
 from roller_env.lab.runner import Name
-from roller_env.lab.simulate import Float64
 from roller_env.lab.table import Frame
 from roller_env.level import Level, load_level
 from roller_env.level.expand import expand

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
 
+from roller_env.arrays import Float64
 from roller_env.config import EnvConfig
 from roller_env.game.actions import forces, held_keys
 from roller_env.lab import game
@@ -21,7 +22,6 @@ from roller_env.physics.presets import PhysicsPreset
 from roller_env.physics.stepper import keeps_poses
 from roller_env.units import quants
 
-Float64 = npt.NDArray[np.float64]
 Errors = dict[str, float]
 """What one setting gets wrong, by names such as those of `REQUIREMENTS`."""
 

@@ -18,10 +18,11 @@ from typing import Any, Final, NamedTuple
 import mujoco
 import numpy as np
 
+from roller_env.arrays import Float64
 from roller_env.compile.compiled import CompiledLevel, compile_level
 from roller_env.lab.game import GATE_SPEED_M_S, RADIUS_M, Course, make_level
 from roller_env.lab.runner import interleaved, timed
-from roller_env.lab.simulate import Float64, Path, Start, record, settled, started
+from roller_env.lab.simulate import Path, Start, record, settled, started
 from roller_env.lab.stability import contacts
 from roller_env.lab.stability.contacts import EULER, SETTLE_S, TAU_S, WALL_M, ball_on_box, thrown
 from roller_env.lab.stability.limits import words

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-import numpy as np
-import numpy.typing as npt
-
+from roller_env.arrays import Float64, Int64
 from roller_env.physics.rigid.closest import from_centre, local
 from roller_env.physics.rigid.kernels import (
     Record,
@@ -22,9 +20,6 @@ from roller_env.physics.rigid.kernels import (
 )
 from roller_env.physics.rigid.scene import MARGIN_M, Scenes
 from roller_env.physics.rigid.states import States
-
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 _PARALLEL: Final = 1e-15
 

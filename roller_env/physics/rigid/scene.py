@@ -12,10 +12,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from roller_env.arrays import Float64, Int64
 from roller_env.physics.rigid.kernels import Records
 
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 Int32 = npt.NDArray[np.int32]
 
 STATIC: Final = -1

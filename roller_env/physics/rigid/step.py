@@ -18,9 +18,7 @@ from __future__ import annotations
 
 from typing import Any, Final, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
+from roller_env.arrays import Float64, Int64
 from roller_env.physics.rigid.attitude import turn, turned, turned_back
 from roller_env.physics.rigid.events import features_end, goes_alone, next_impact
 from roller_env.physics.rigid.holding import (
@@ -69,9 +67,6 @@ from roller_env.physics.rigid.scene import MARGIN_M, Scenes
 from roller_env.physics.rigid.slabs import move_slabs, set_going, time_to_stop
 from roller_env.physics.rigid.states import Commands, Counts, States
 from roller_env.physics.rigid.workspace import Workspace
-
-Float64 = npt.NDArray[np.float64]
-Int64 = npt.NDArray[np.int64]
 
 MOST_SEGMENTS: Final = 200
 """In one control step, besides 8 for each time of the cap; beyond it the ball is moved on by force,
