@@ -309,9 +309,19 @@ class Simulation:
 
     def result(self, row: int = 0) -> EpisodeResult:
         """Return how the game in a row stands."""
-        values = {name: found[0].tolist() for name, found in self.results(np.array([row])).items()}
-        terms = dict(zip(REWARD_TERMS, values.pop("reward_terms"), strict=True))
-        return EpisodeResult(**values, reward_terms=terms)
+        state, one = self.state, slice(row, row + 1)
+        score = score_percent(state.coins[one], self.coins_in_level[one], state.finished[one])
+        return EpisodeResult(
+            success=state.finished.item(row),
+            fall=state.fallen.item(row),
+            diverged=state.diverged.item(row),
+            truncated=state.truncated.item(row),
+            coins=state.coins.item(row),
+            score_percent=score.item(),
+            time_s=state.steps.item(row) * self.duration_s,
+            total_reward=state.total_reward.item(row),
+            reward_terms=dict(zip(REWARD_TERMS, state.reward_terms[row].tolist(), strict=True)),
+        )
 
     # What changes it -------------------------------------------------------------------------
 

@@ -23,7 +23,18 @@ TERMS: Final = "reward_terms"
 
 def single_info(simulation: Simulation) -> dict[str, Any]:
     """Return the info of a simulation of one game."""
-    (info,) = rows_of(vector_info(simulation))
+    result = simulation.result()
+    info: dict[str, Any] = {
+        "success": result.success,
+        "is_success": result.success,
+        "score_percent": result.score_percent,
+        "coins": result.coins,
+        "time_s": result.time_s,
+        "fall": result.fall,
+        "diverged": result.diverged,
+    }
+    if result.outcome != "not ended":
+        info[TERMS] = result.reward_terms
     return info
 
 
