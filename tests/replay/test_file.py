@@ -224,7 +224,7 @@ def test_a_header_with_anything_in_a_field_is_refused_or_read(value: Any, field:
         (lambda h: h.update(quantities=[]), "longer or shorter"),
         (lambda h: h.update(player="\x1b]0;title\x07"), "cannot be printed"),
         (lambda h: h["versions"].update(mujoco="4\x1b[2J"), "cannot be printed"),
-        (lambda h: h["versions"].update(engine="rigid"), "engine"),
+        (lambda h: h["versions"].update(engine="warp"), "engine"),
         (lambda h: h["versions"].update(rules=-1), "rules"),
         (lambda h: h["options"].update(action="force"), "is written"),
         (lambda h: h.update(kind="pickle"), "not a replay"),
