@@ -19,7 +19,8 @@ from roller_env.game.actions import forces
 from roller_env.game.result import EpisodeResult
 from roller_env.game.version import RULES_VERSION
 from roller_env.level import Level
-from roller_env.physics.version import PHYSICS_VERSION, Engine
+from roller_env.physics.presets import Engine
+from roller_env.physics.version import PHYSICS_VERSION
 from roller_env.replay.actions import Actions, checked_actions
 from roller_env.replay.checksums import MAX_ROWS, QUANTITIES, Checksums, row_count
 from roller_env.replay.errors import ReplayError

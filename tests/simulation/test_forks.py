@@ -61,7 +61,7 @@ def test_a_forked_process_plays_its_parents_games_on_with_the_same_bits(
     level: str, threads: int, physics: str, num_envs: int
 ) -> None:
     """So many that they are shared among threads."""
-    options = {"num_threads": threads, "observation": "rays", "physics": physics}
+    options: dict[str, Any] = {"num_threads": threads, "observation": "rays", "physics": physics}
     simulation = simulation_of(level, num_envs, **options)
     for force, _ in zip(wandering(num_envs), range(20), strict=False):
         simulation.step(force)
