@@ -26,6 +26,9 @@ from roller_env.pieces.piece import Solid
 CAP_S = 1 / 120
 """Longest step where motions have no closed form."""
 
+LARGEST = 1e10
+"""What is larger, in SI units, counts as no longer finite: MuJoCo's ``mjMAXVAL``."""
+
 WORLDS_A_THREAD = 32
 """Fewer are not worth a thread of their own."""
 
@@ -108,8 +111,8 @@ class RigidPhysics:
         return self._advance(worlds)
 
     def diverged(self) -> Bool:
-        """Say which worlds are no longer finite."""
-        return np.logical_not(np.isfinite(self.state).all(axis=1))
+        """Say which worlds are no longer finite, or larger than anything in a game can be."""
+        return np.logical_not((np.abs(self.state) <= LARGEST).all(axis=1))
 
     def rays(
         self, offsets: Float64, directions: Float64, longest: float, worlds: Int64 | None

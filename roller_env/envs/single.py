@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -10,13 +10,15 @@ from gymnasium.envs.registration import EnvSpec
 
 from roller_env.arrays import UInt8
 from roller_env.config import EnvConfig, make_config
-from roller_env.drawing.renderer import GameRenderer
 from roller_env.envs import spaces
 from roller_env.envs.arguments import reset_of, seed_of
 from roller_env.envs.infos import single_info
 from roller_env.envs.specs import plain_spec
 from roller_env.game.actions import forces
 from roller_env.simulation import Simulation, Snapshot
+
+if TYPE_CHECKING:
+    from roller_env.drawing.renderer import GameRenderer
 
 
 class RollerEnv(gym.Env[Any, Any]):
@@ -149,5 +151,8 @@ class RollerEnv(gym.Env[Any, Any]):
 
     def _picture(self) -> UInt8:
         if self._renderer is None:
+            # Not above: what is not drawn needs no MuJoCo on the rigid engine.
+            from roller_env.drawing.renderer import GameRenderer
+
             self._renderer = GameRenderer(self.simulation, self.config.width, self.config.height)
         return self._renderer.render(0, self.config.camera)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -16,13 +16,15 @@ from gymnasium.vector.utils import batch_space
 from roller_env.arrays import Bool, Float64, Int64, UInt8
 from roller_env.checks import nearest
 from roller_env.config import EnvConfig, make_config
-from roller_env.drawing.renderer import GameRenderer
 from roller_env.envs import spaces
 from roller_env.envs.arguments import reset_of, seeds_of
 from roller_env.envs.infos import vector_info
 from roller_env.envs.specs import plain_spec
 from roller_env.game.actions import forces
 from roller_env.simulation import Simulation, Snapshot
+
+if TYPE_CHECKING:
+    from roller_env.drawing.renderer import GameRenderer
 
 
 class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
@@ -171,6 +173,9 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
     def picture(self, row: int) -> UInt8:
         """Return a picture of one row, (height, width, 3) uint8."""
         if self._renderer is None:
+            # Not above: what is not drawn needs no MuJoCo on the rigid engine.
+            from roller_env.drawing.renderer import GameRenderer
+
             self._renderer = GameRenderer(self.simulation, self.config.width, self.config.height)
         return self._renderer.render(row, self.config.camera)
 

@@ -352,8 +352,7 @@ def _kind_of(found: Any, kinds: Sequence[type[Header]]) -> type[Header]:
             return kind
     hint = "; roller replay FILE --convert NEW makes a new file of it" if found == 1 else ""
     raise ReplayError(
-        f"found format {str(found)[:20]}; this version of Roller plays format "
-        f"{FORMAT_VERSION}{hint}"
+        f"found format {found!r:.20}; this version of Roller plays format {FORMAT_VERSION}{hint}"
     )
 
 

@@ -97,7 +97,7 @@ def test_the_way_back_is_paid_back_by_the_shaping() -> None:
     assert progress == pytest.approx(rails.state.shaping.potential[0])
 
 
-@pytest.mark.parametrize("physics", ["fast", "default", "accurate"])
+@pytest.mark.parametrize("physics", ["fast", "default", "accurate", "rigid"])
 def test_in_the_game_it_goes_on_from_there(physics: str) -> None:
     island = {"at": (3.0, 0.0, -0.5), "size": (8.0, 4.0, 1.0)}
     point = {"at": resting(1.0), "size": (0.2, 3.0, 1.0)}

@@ -313,7 +313,7 @@ def lift_level(**pieces: Any) -> Level:
     return make_level(**{"lift_pads": [PAD], "start": {"at": ON_PAD}} | pieces)
 
 
-@pytest.mark.parametrize("physics", ["fast", "default", "accurate"])
+@pytest.mark.parametrize("physics", ["fast", "default", "accurate", "rigid"])
 def test_a_pad_lifts_1425_quants_while_it_pushes_and_1846_with_the_coast(physics: str) -> None:
     game = Game(lift_level(), physics=physics)
     game.step()

@@ -11,7 +11,7 @@ from roller_env.level import Level
 from roller_env.pieces.plate import PLATE
 from tests.builders import BALL_RADIUS_M, GROUND, Float64, Game, make_level
 
-PRESETS = ("fast", "default", "accurate")
+PRESETS = ("fast", "default", "accurate", "rigid")
 SINK_M = 0.002
 """How deep a ball that rests on the ground lies in it with the coarsest preset, twice over."""
 

@@ -114,7 +114,7 @@ def test_an_environment_with_held_keys_plays_the_same_game() -> None:
     assert (unwrapped.simulation.qpos == session.simulation.qpos).all()
 
 
-@pytest.mark.parametrize("physics", ["fast", "default", "accurate"])
+@pytest.mark.parametrize("physics", ["fast", "default", "accurate", "rigid"])
 def test_a_second_of_frames_is_a_second_of_the_presets_steps(physics: str) -> None:
     session = game(physics=physics)
     assert session.simulation.config.substeps == 1

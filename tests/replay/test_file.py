@@ -210,6 +210,7 @@ def test_a_header_with_anything_in_a_field_is_refused_or_read(value: Any, field:
         (lambda h: h.update(level_sha256="0" * 64), "does not match its hash"),
         (lambda h: h.update(format=3), "found format 3; this version of Roller plays format 2"),
         (lambda h: h.update(format=True), "found format True; this version"),
+        (lambda h: h.update(format="\n"), r"found format '\n'; this version"),
         (lambda h: h.update(format=1), "roller replay FILE --convert NEW makes a new file"),
         (lambda h: h.update(encoding="f8"), "longer or shorter"),
         (lambda h: h.update(encoding="f8", steps=1), "longer or shorter"),

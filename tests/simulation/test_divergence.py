@@ -56,11 +56,13 @@ def diverge(simulation: Simulation) -> Transition:
         return simulation.step(np.zeros((simulation.num_envs, 2)))
 
 
+@pytest.mark.parametrize("physics", ["default", "rigid"])
 @pytest.mark.parametrize("kind", POISONS)
-def test_a_diverging_game_ends_alone(kind: str) -> None:
+def test_a_diverging_game_ends_alone(kind: str, physics: str) -> None:
     # A position that is wrong from the start has no potential to begin the shaping with.
     reward = "shaped" if POISONS[kind][0] else "points"
     options: dict[str, Any] = {"reward": reward, "observation": "rays", "num_threads": 2}
+    options["physics"] = physics
     poisoned = simulation_of("gate", num_envs=4, **options)
     healthy = simulation_of("gate", num_envs=4, **options)
     for force, _ in zip(wandering(4), range(10), strict=False):

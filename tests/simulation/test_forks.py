@@ -54,13 +54,16 @@ def play_on(simulation: Simulation, steps: int = 30) -> list[Any]:
     return seen
 
 
+@pytest.mark.parametrize(("physics", "num_envs"), [("default", 4), ("rigid", 70)])
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("level", ["gate", "classic"])
 def test_a_forked_process_plays_its_parents_games_on_with_the_same_bits(
-    level: str, threads: int
+    level: str, threads: int, physics: str, num_envs: int
 ) -> None:
-    simulation = simulation_of(level, num_envs=4, num_threads=threads, observation="rays")
-    for force, _ in zip(wandering(4), range(20), strict=False):
+    """So many that they are shared among threads."""
+    options: dict[str, Any] = {"num_threads": threads, "observation": "rays", "physics": physics}
+    simulation = simulation_of(level, num_envs, **options)
+    for force, _ in zip(wandering(num_envs), range(20), strict=False):
         simulation.step(force)
     theirs = in_a_fork(lambda: play_on(simulation))
     assert theirs == play_on(simulation)
