@@ -133,9 +133,10 @@ def _report(source: str, physics: Preset) -> tuple[int, int]:
 
 
 def _play(physics: Preset) -> Play:
+    preset = physics_preset(physics)
     # The hardest push is that of two keys.
     return Play(
-        dt_s=physics_preset(physics).dt_s,
+        dt_s=preset.dt_s if preset.engine == "mujoco" else 0.0,
         push_n=math.hypot(KEY_FORCE_N, KEY_FORCE_N),
     )
 

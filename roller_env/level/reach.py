@@ -49,7 +49,7 @@ class Play(NamedTuple):
     """How a level is to be played.
 
     Attributes:
-        dt_s: physics step, seconds.
+        dt_s: physics step, seconds; 0 if the engine jumps over nothing.
         push_n: the hardest push there is, newtons.
     """
 
