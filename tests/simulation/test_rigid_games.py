@@ -200,4 +200,6 @@ def test_an_environment_is_made_and_stepped_without_mujoco() -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it is not counted in KiB")
 def test_a_hundred_thousand_games_fit_in_a_gigabyte() -> None:
+    # Compiling takes more than that, once for a machine: here, so that the games are measured.
+    printed(MANY.replace("100_000", "2"))
     assert int(printed(MANY)) * 1024 < 1e9
