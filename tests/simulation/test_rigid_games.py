@@ -167,8 +167,8 @@ print([name for name in sys.modules if name.startswith("mujoco.")])
 """
 
 MANY = """
-import resource
 import numpy as np
+import psutil
 from roller_env.config import make_config
 from roller_env.simulation import Simulation
 games = Simulation(make_config(level="classic", physics="rigid"), 100_000)
@@ -176,7 +176,7 @@ games.reset()
 for _ in range(3):
     games.step(np.ones((100_000, 2)))
     games.observe()
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+print(psutil.Process().memory_info().rss)
 """
 
 
@@ -200,6 +200,7 @@ def test_an_environment_is_made_and_stepped_without_mujoco() -> None:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it is not counted in KiB")
 def test_a_hundred_thousand_games_fit_in_a_gigabyte() -> None:
-    # Compiling takes more than that, once for a machine: here, so that the games are measured.
+    # Compiling takes more than that, once for a machine: here, so that the games are measured. A
+    # process's highest use is no measure: it begins with that of the process that started it.
     printed(MANY.replace("100_000", "2"))
-    assert int(printed(MANY)) * 1024 < 1e9
+    assert int(printed(MANY)) < 1e9
