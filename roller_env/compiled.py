@@ -34,17 +34,17 @@ def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def compiled_with_packages(
-    *others: str, makes_arrays: bool = True
+    *others: str,
 ) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
     """Return a decorator that compiles as `compiled` does, to run without Python's lock.
 
     The function may use functions and constants of all modules in its own directory, and in those
     of the packages ``others``: what was kept of it is compiled anew when any of them has changed.
-    One that does not make arrays consists of device functions.
+    It makes no arrays, and consists of device functions.
     """
 
     def decorate(function: Callable[_P, _R]) -> Callable[_P, _R]:
-        dispatcher = _dispatcher(function, nogil=True, _nrt=makes_arrays)
+        dispatcher = _dispatcher(function, nogil=True, _nrt=False)
         file = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
         if file is not None:
             # Of the function's own file, as Numba has it; it has no name for a stamp of several.
@@ -56,7 +56,7 @@ def compiled_with_packages(
     return decorate
 
 
-compiled_with_package = compiled_with_packages(makes_arrays=False)
+compiled_with_package = compiled_with_packages()
 """Decorates a function that uses those of its own directory alone."""
 
 

@@ -15,7 +15,6 @@ from roller_env.arrays import Bool, Float32, Float64, Int64
 from roller_env.config import MAX_ENVS, EnvConfig
 from roller_env.divergence import report
 from roller_env.game import observations, step
-from roller_env.game.bodies import Bodies
 from roller_env.game.result import REWARD_TERMS, EpisodeResult
 from roller_env.game.state import GameState, score_percent
 from roller_env.game.step import Games, Rewarding
@@ -23,7 +22,7 @@ from roller_env.game.tables import LevelTable
 from roller_env.level import Level, load_level
 from roller_env.level.check import obstacles, obstructions
 from roller_env.physics.presets import PhysicsPreset
-from roller_env.physics.protocol import Columns, Physics
+from roller_env.physics.protocol import Bodies, Columns, Physics
 from roller_env.pieces.coin import COIN
 from roller_env.pieces.fields import MAX_COORDINATE_M
 from roller_env.pieces.gate import GATE

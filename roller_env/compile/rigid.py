@@ -11,7 +11,7 @@ from roller_env.arrays import Bool, Float64, Int64
 from roller_env.compile.merge import merge_solids
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
-from roller_env.physics.protocol import Columns
+from roller_env.physics.protocol import Bodies, Columns
 from roller_env.physics.rigid.rays import cast_rays
 from roller_env.physics.rigid.scene import STATIC, RigidLevel, SolidBox, pack
 from roller_env.physics.rigid.states import (
@@ -82,6 +82,7 @@ class RigidPhysics:
         movers = self._scenes.slab_stop.shape[1]
         self.columns = Columns(0, 3, 7, 10, 13, 13, 13 + movers, 16 + movers, movers, path=0)
         self.state: Float64 = np.zeros((num_envs, 16 + 2 * movers))
+        self._bodies = Bodies.of(self.state, self.columns)
         self._threads = min(num_threads or os.cpu_count() or 1, -(-num_envs // WORLDS_A_THREAD))
         self._level_of = np.zeros(num_envs, dtype=np.int64)
         self._every = np.arange(num_envs)
@@ -96,8 +97,8 @@ class RigidPhysics:
     def reset(self, worlds: Int64) -> None:
         """Put worlds back to where the level begins, at rest."""
         self.state[worlds] = 0.0
-        self.state[worlds, :3] = self._start
-        self.state[worlds, 3] = 1.0
+        self._bodies.position[worlds] = self._start
+        self._bodies.orientation[worlds, 0] = 1.0
 
     def advance(self, worlds: Int64 | None) -> Float64:
         """Advance worlds (all, if None), and return their balls' centres."""
@@ -161,21 +162,20 @@ class RigidPhysics:
 
     def _read(self) -> None:
         """Take the worlds from `state`, which others may have written to."""
-        at, state, movers = self.columns, self.state, self.columns.movers
-        states, commands = self._states, self._commands
-        states.position[:] = state[:, at.position : at.position + 3]
-        states.orientation[:] = state[:, at.orientation : at.orientation + 4]
-        states.velocity[:] = state[:, at.velocity : at.velocity + 3]
-        states.spin[:] = state[:, at.angular_velocity : at.angular_velocity + 3]
-        states.slab[:] = state[:, at.displacement : at.displacement + movers]
-        commands.force[:] = state[:, at.force_n : at.force_n + 3]
-        commands.slab_velocity[:] = state[:, at.pull : at.pull + movers]
+        bodies, states, commands = self._bodies, self._states, self._commands
+        states.position[:] = bodies.position
+        states.orientation[:] = bodies.orientation
+        states.velocity[:] = bodies.velocity
+        states.spin[:] = bodies.angular_velocity
+        states.slab[:] = bodies.displacement
+        commands.force[:] = bodies.force_n
+        commands.slab_velocity[:] = bodies.pull
 
     def _write(self, rows: Int64) -> None:
         """Put worlds that have moved into `state`."""
-        at, state, states = self.columns, self.state, self._states
-        state[rows, at.position : at.position + 3] = states.position[rows]
-        state[rows, at.orientation : at.orientation + 4] = states.orientation[rows]
-        state[rows, at.velocity : at.velocity + 3] = states.velocity[rows]
-        state[rows, at.angular_velocity : at.angular_velocity + 3] = states.spin[rows]
-        state[rows, at.displacement : at.displacement + at.movers] = states.slab[rows]
+        bodies, states = self._bodies, self._states
+        bodies.position[rows] = states.position[rows]
+        bodies.orientation[rows] = states.orientation[rows]
+        bodies.velocity[rows] = states.velocity[rows]
+        bodies.angular_velocity[rows] = states.spin[rows]
+        bodies.displacement[rows] = states.slab[rows]

@@ -29,7 +29,7 @@ from roller_env.pieces.rules import WORK, After, Before, CameraAsked, Noticed, S
 from roller_env.pieces.sweep import bounds, meets, time_of_fall, vector, visit
 from roller_env.units import frames
 
-kernel = compiled_with_packages("roller_env.pieces", makes_arrays=False)
+kernel = compiled_with_packages("roller_env.pieces")
 
 SPLASH_S: Final = 1.0
 """`main` freezes the game while it shows the splash screen, a second after loading the level."""

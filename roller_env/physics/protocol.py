@@ -35,6 +35,37 @@ class Columns(NamedTuple):
     path: int
 
 
+class Bodies(NamedTuple):
+    """Views of the columns of N envs; see `Columns`."""
+
+    position: Float64
+    orientation: Float64
+    velocity: Float64
+    angular_velocity: Float64
+    displacement: Float64
+    aim: Float64
+    force_n: Float64
+    pull: Float64
+
+    @staticmethod
+    def of(physics: Float64, at: Columns) -> Bodies:
+        """Return views of ``physics``, (N, width)."""
+
+        def columns(first: int, count: int) -> Float64:
+            return physics[:, first : first + count]
+
+        return Bodies(
+            position=columns(at.position, 3),
+            orientation=columns(at.orientation, 4),
+            velocity=columns(at.velocity, 3),
+            angular_velocity=columns(at.angular_velocity, 3),
+            displacement=columns(at.displacement, at.movers),
+            aim=columns(at.aim, at.movers),
+            force_n=columns(at.force_n, 3),
+            pull=columns(at.pull, at.movers),
+        )
+
+
 class Physics(Protocol):
     """N worlds of one level: balls, and slabs that go down.
 

@@ -9,13 +9,12 @@ import numpy as np
 
 from roller_env.arrays import Bool, Float64, Int64
 from roller_env.game import step
-from roller_env.game.bodies import Bodies
 from roller_env.game.rewards import RewardWeights
 from roller_env.game.state import GameState
 from roller_env.game.step import Games, Rewarding
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level
-from roller_env.physics.protocol import Columns
+from roller_env.physics.protocol import Bodies, Columns
 from roller_env.pieces.coin import COIN
 from tests.builders import Vector
 

@@ -198,7 +198,6 @@ def test_an_environment_is_made_and_stepped_without_mujoco() -> None:
     assert printed(WITHOUT_MUJOCO) == "[]"
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it is not counted in KiB")
 def test_a_hundred_thousand_games_fit_in_a_gigabyte() -> None:
     # Compiling takes more than that, once for a machine: here, so that the games are measured. A
     # process's highest use is no measure: it begins with that of the process that started it.

@@ -178,7 +178,9 @@ def slip_on_floor_and_wall(state: Float64, force: Float64, duration: float) -> F
     def rates(_: float, y: Float64) -> Float64:
         v, w = y[3:6], y[6:]
         slips = [v - (n @ v) * n + RADIUS_M * np.cross(n, w) for n in normals]
-        units = np.array([n - FRICTION * u / np.linalg.norm(u) for n, u in zip(normals, slips)])  # noqa: B905
+        units = np.array(
+            [n - FRICTION * u / np.linalg.norm(u) for n, u in zip(normals, slips, strict=True)]
+        )
         push = np.linalg.solve(normals @ units.T, -normals @ force)
         drags = push[:, None] * (units - normals)
         torque = -2.5 / RADIUS_M * np.cross(normals, drags).sum(axis=0)
