@@ -22,7 +22,7 @@ from roller_env.game.tables import LevelTable
 from roller_env.level import Level, load_level
 from roller_env.level.check import obstacles, obstructions
 from roller_env.physics.presets import PhysicsPreset
-from roller_env.physics.protocol import Bodies, Columns, Physics
+from roller_env.physics.protocol import Bodies, Columns, Path, Physics
 from roller_env.pieces.coin import COIN
 from roller_env.pieces.fields import MAX_COORDINATE_M
 from roller_env.pieces.gate import GATE
@@ -464,12 +464,12 @@ class Simulation:
         before = physics[every].copy()
         hanging = games.hanging_s[every]
         path = self._let_go(rows, hanging) if hanging.any() else self._physics.advance(rows)
-        diverged = self._physics.diverged()[every] | ~np.isfinite(path[:, -1]).all(axis=1)
+        diverged = self._physics.diverged()[every]
         if diverged.any():
             self._end_diverged(envs[diverged], path, diverged, before)
         step.conclude(games.concluding, envs, duration_s, path, physics, self._at, self._rewarding)
 
-    def _let_go(self, rows: Int64 | None, hanging_s: Float64) -> Float64:
+    def _let_go(self, rows: Int64 | None, hanging_s: Float64) -> Path:
         """Advance rows of which some begin to move only after ``hanging_s``, (n,); return paths."""
         still = np.rint(hanging_s / self.preset.dt_s).astype(np.int64)
         return self._physics.advance_late(rows, np.minimum(still, self._physics.substeps))
@@ -494,14 +494,14 @@ class Simulation:
                 self.state.shaping,
             )
 
-    def _end_diverged(self, rows: Int64, path: Float64, diverged: Bool, before: Float64) -> None:
+    def _end_diverged(self, rows: Int64, path: Path, diverged: Bool, before: Float64) -> None:
         """Report the rows that diverged, and put their physics back to where it is finite.
 
         Their games are over, so nothing reads the physics but the last observation.
 
         Args:
             rows: (m,) which.
-            path: (n, S + 1, nq) of the n rows that were stepped.
+            path: of the n rows that were stepped.
             diverged: (n,) which of those are ``rows``.
             before: (n, width) the state of the physics before the step.
         """
@@ -515,7 +515,8 @@ class Simulation:
         self._physics.reset(rows)
         self._bodies.position[rows] = self.table.start[self._games.level_of[rows]]
         at = self._at.path
-        path[diverged, :, at : at + 3] = self._bodies.position[rows][:, None, :]
+        path.at[diverged] = 0.0
+        path.at[diverged, :, at : at + 3] = self._bodies.position[rows][:, None, :]
         self.state.diverged[rows] = True
 
     # What is seen ----------------------------------------------------------------------------

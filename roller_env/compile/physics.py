@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from roller_env.arrays import Bool, Float64, Int64
 from roller_env.compile.compiled import CompiledLevel
-from roller_env.physics.protocol import Columns
+from roller_env.physics.protocol import Columns, Path
 from roller_env.physics.stepper import Stepper
 
 
@@ -15,6 +17,7 @@ class MujocoPhysics:
         """Make the worlds; the arguments are those of `Stepper`."""
         self.substeps = substeps
         self._ball = compiled.ball_body
+        self._knots = np.full(num_envs, substeps + 1)
         self._stepper = Stepper(compiled.model, num_envs, substeps, num_threads)
         self.state = self._stepper.state
         self.columns = self._columns(compiled)
@@ -39,23 +42,28 @@ class MujocoPhysics:
             pull=first["ctrl"] + 3,
             movers=self._stepper.act.shape[1],
             path=compiled.ball_qpos,
+            path_width=3,
         )
 
     def reset(self, worlds: Int64) -> None:
         """Put worlds back to where the level begins, and forget their warnings."""
         self._stepper.reset(worlds)
 
-    def advance(self, worlds: Int64 | None) -> Float64:
-        """Advance worlds (all, if None); the path is of ``qpos``."""
-        return self._stepper.advance(worlds)
+    def advance(self, worlds: Int64 | None) -> Path:
+        """Advance worlds (all, if None); the path is of ``qpos`` after every physics step."""
+        return self._straight(self._stepper.advance(worlds))
 
-    def advance_late(self, worlds: Int64 | None, still: Int64) -> Float64:
+    def advance_late(self, worlds: Int64 | None, still: Int64) -> Path:
         """Advance worlds, each after it has stood still for a while."""
-        return self._stepper.advance_late(worlds, still)
+        return self._straight(self._stepper.advance_late(worlds, still))
+
+    def _straight(self, places: Float64) -> Path:
+        return Path(places, self._knots[: len(places)])
 
     def diverged(self) -> Bool:
-        """Say which worlds, (N,), MuJoCo has warned of."""
-        return self._stepper.diverged()
+        """Say which worlds, (N,), MuJoCo has warned of, or are not finite."""
+        lost: Bool = self._stepper.diverged() | ~np.isfinite(self._stepper.qpos).all(axis=1)
+        return lost
 
     def rays(
         self, offsets: Float64, directions: Float64, longest: float, worlds: Int64 | None

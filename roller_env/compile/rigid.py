@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 
@@ -11,11 +12,16 @@ from roller_env.arrays import Bool, Float64, Int64
 from roller_env.compile.merge import merge_solids
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
-from roller_env.physics.protocol import Bodies, Columns
+from roller_env.physics.protocol import Columns, Path
 from roller_env.physics.rigid.rays import cast_rays
 from roller_env.physics.rigid.scene import STATIC, RigidLevel, SolidBox, pack
 from roller_env.physics.rigid.states import (
-    make_commands,
+    FORCE,
+    ORIENTATION,
+    POSITION,
+    SLAB,
+    SPIN,
+    VELOCITY,
     make_counts,
     make_states,
 )
@@ -28,6 +34,10 @@ CAP_S = 1 / 120
 
 LARGEST = 1e10
 """What is larger, in SI units, counts as no longer finite: MuJoCo's ``mjMAXVAL``."""
+
+KNOTS = 24
+KNOTS_A_CAP = 4
+"""Room for the knots of a path: so many, and so many more for each time of the cap in a step."""
 
 WORLDS_A_THREAD = 32
 """Fewer are not worth a thread of their own."""
@@ -80,36 +90,54 @@ class RigidPhysics:
         self._start, self._duration_s = level.start.at, duration_s
         self._scenes = pack([rigid_level(level)])
         movers = self._scenes.slab_stop.shape[1]
-        self.columns = Columns(0, 3, 7, 10, 13, 13, 13 + movers, 16 + movers, movers, path=0)
-        self.state: Float64 = np.zeros((num_envs, 16 + 2 * movers))
-        self._bodies = Bodies.of(self.state, self.columns)
+        self.columns = Columns(
+            position=POSITION,
+            orientation=ORIENTATION,
+            velocity=VELOCITY,
+            angular_velocity=SPIN,
+            displacement=SLAB,
+            aim=SLAB,
+            force_n=FORCE,
+            pull=SLAB + movers,
+            movers=movers,
+            path=0,
+            path_width=6,
+        )
+        self._worlds = make_states(self._scenes, num_envs)
+        self.state: Float64 = self._worlds.packed
         self._threads = min(num_threads or os.cpu_count() or 1, -(-num_envs // WORLDS_A_THREAD))
         self._level_of = np.zeros(num_envs, dtype=np.int64)
         self._every = np.arange(num_envs)
-        self._states = make_states(self._scenes, num_envs)
-        self._commands = make_commands(self._scenes, num_envs)
         self._counts = make_counts(num_envs)
         self._workspace = make_workspace(self._scenes, self._threads)
-        self._path = np.zeros((num_envs, substeps + 1, 3))
+        most = KNOTS + math.ceil(KNOTS_A_CAP * duration_s / CAP_S)
+        self._path = Path(np.zeros((num_envs, most, 6)), np.zeros(num_envs, dtype=np.int64))
         self._pool: tuple[int, ThreadPoolExecutor] | None = None
         self.reset(self._every)
 
     def reset(self, worlds: Int64) -> None:
         """Put worlds back to where the level begins, at rest."""
         self.state[worlds] = 0.0
-        self._bodies.position[worlds] = self._start
-        self._bodies.orientation[worlds, 0] = 1.0
+        self._worlds.position[worlds] = self._start
+        self._worlds.orientation[worlds, 0] = 1.0
 
-    def advance(self, worlds: Int64 | None) -> Float64:
-        """Advance worlds (all, if None), and return their balls' centres."""
-        self._commands.delay[:] = 0.0
-        return self._advance(worlds)
+    def advance(self, worlds: Int64 | None) -> Path:
+        """Advance worlds (all, if None), and return their balls' ways."""
+        rows = self._every if worlds is None else worlds
+        path = Path(self._path.at[: len(rows)], self._path.knots[: len(rows)])
+        threads = min(self._threads, -(-len(rows) // WORLDS_A_THREAD))
+        if threads <= 1:
+            self._advance_some(rows, path.at, path.knots, 0)
+        else:
+            parts = (np.array_split(each, threads) for each in (rows, *path))
+            list(self._ready_pool().map(self._advance_some, *parts, range(threads)))
+        return path
 
-    def advance_late(self, worlds: Int64 | None, still: Int64) -> Float64:
+    def advance_late(self, worlds: Int64 | None, still: Int64) -> Path:
         """Advance worlds, each after it has stood still for a while."""
-        every = self._every if worlds is None else worlds
-        self._commands.delay[every] = still * (self._duration_s / self.substeps)
-        return self._advance(worlds)
+        rows = self._every if worlds is None else worlds
+        self._worlds.delay[rows] = still * (self._duration_s / self.substeps)
+        return self.advance(worlds)
 
     def diverged(self) -> Bool:
         """Say which worlds are no longer finite, or larger than anything in a game can be."""
@@ -120,35 +148,22 @@ class RigidPhysics:
     ) -> Float64:
         """Return the distances, (n, rays) metres, to the first solid along each ray."""
         rows = self._every if worlds is None else worlds
-        self._read()
         found = np.empty((len(rows), len(directions)))
         cast_rays(
-            self._scenes, self._level_of, self._states, rows, offsets, directions, longest, found
+            self._scenes, self._level_of, self.state, rows, offsets, directions, longest, found
         )
         return found
 
-    def _advance(self, worlds: Int64 | None) -> Float64:
-        rows = self._every if worlds is None else worlds
-        self._read()
-        threads = min(self._threads, -(-len(rows) // WORLDS_A_THREAD))
-        if threads <= 1:
-            self._advance_some(rows, 0)
-        else:
-            parts = np.array_split(rows, threads)
-            list(self._ready_pool().map(self._advance_some, parts, range(threads)))
-        self._write(rows)
-        return self._path if worlds is None else self._path[worlds]
-
-    def _advance_some(self, rows: Int64, thread: int) -> None:
+    def _advance_some(self, rows: Int64, path: Float64, knots: Int64, thread: int) -> None:
         advance(
             self._scenes,
             self._level_of,
-            self._states,
-            self._commands,
+            self.state,
             rows,
             self._duration_s,
             CAP_S,
-            self._path,
+            path,
+            knots,
             self._counts,
             self._workspace,
             thread,
@@ -159,23 +174,3 @@ class RigidPhysics:
         if self._pool is None or self._pool[0] != os.getpid():
             self._pool = os.getpid(), ThreadPoolExecutor(self._threads)
         return self._pool[1]
-
-    def _read(self) -> None:
-        """Take the worlds from `state`, which others may have written to."""
-        bodies, states, commands = self._bodies, self._states, self._commands
-        states.position[:] = bodies.position
-        states.orientation[:] = bodies.orientation
-        states.velocity[:] = bodies.velocity
-        states.spin[:] = bodies.angular_velocity
-        states.slab[:] = bodies.displacement
-        commands.force[:] = bodies.force_n
-        commands.slab_velocity[:] = bodies.pull
-
-    def _write(self, rows: Int64) -> None:
-        """Put worlds that have moved into `state`."""
-        bodies, states = self._bodies, self._states
-        bodies.position[rows] = states.position[rows]
-        bodies.orientation[rows] = states.orientation[rows]
-        bodies.velocity[rows] = states.velocity[rows]
-        bodies.angular_velocity[rows] = states.spin[rows]
-        bodies.displacement[rows] = states.slab[rows]

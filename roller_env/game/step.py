@@ -24,7 +24,7 @@ from roller_env.game.rewards import ShapingState, next_waypoint, route_progress,
 from roller_env.game.slabs import lowering
 from roller_env.game.state import GameState
 from roller_env.game.tables import LevelTable, Movers, Regions, Routes
-from roller_env.physics.protocol import Columns
+from roller_env.physics.protocol import Columns, Path
 from roller_env.pieces.rules import WORK, After, Before, CameraAsked, Noticed, Seen
 from roller_env.pieces.sweep import bounds, meets, time_of_fall, vector, visit
 from roller_env.units import frames
@@ -54,11 +54,11 @@ class Step(NamedTuple):
 
     Attributes:
         live: (N, R) which regions could do something.
-        entry: (N, R) physics steps until the ball entered each region and it counted; ``inf`` where
-            it did not.
+        entry: (N, R) pieces of the path until the ball entered each region and it counted; ``inf``
+            where it did not.
         inside: (N, R) which regions it is in at the end.
-        end: (N,) physics steps until the finish or the fall; ``inf`` if neither, -``inf`` where the
-            step does not count.
+        end: (N,) pieces of the path until the finish or the fall; ``inf`` if neither, -``inf`` where
+            the step does not count.
         fell: (N,) whether the ball fell, be the game over or not.
         coins: (N, 1) how many coins were collected.
         terms: (N, terms) what the step has earned, by `roller_env.game.result.REWARD_TERMS`.
@@ -299,7 +299,7 @@ def conclude(
     games: Concluding,
     envs: Int64,
     duration_s: float,
-    path: Float64,
+    path: Path,
     physics: Float64,
     at: Columns,
     rewarding: Rewarding,
@@ -314,15 +314,15 @@ def conclude(
         games: all of them.
         envs: (n,) which of them.
         duration_s: of the step.
-        path: (n, S + 1, p) where they were before the first physics step and after each; their
-            balls' centres among it.
+        path: where their balls went.
         physics: (N, width) the state of the physics now; a ball put back is written there.
         at: where everything is in both.
         rewarding: what it is worth.
     """
     state, step = games.state, games.step
     for number in range(len(envs)):
-        env, way = envs[number], path[number, :, at.path : at.path + 3]
+        env = envs[number]
+        way = path.at[number, : path.knots[number], at.path : at.path + at.path_width]
         level = games.level_of[env]
         _find_events(games, level, env, duration_s, way)
         state.steps[env] += 1

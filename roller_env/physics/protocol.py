@@ -21,6 +21,8 @@ class Columns(NamedTuple):
         pull: one a slab, a control: m/s at which its aim moves; below zero is down.
         movers: number of slabs.
         path: where the ball's centre begins in a row of the path that a step leaves.
+        path_width: 3 if pieces of the path are straight, 6 if they are bent, by the next three
+            numbers: see `Path`.
     """
 
     position: int
@@ -33,6 +35,7 @@ class Columns(NamedTuple):
     pull: int
     movers: int
     path: int
+    path_width: int
 
 
 class Bodies(NamedTuple):
@@ -66,6 +69,22 @@ class Bodies(NamedTuple):
         )
 
 
+class Path(NamedTuple):
+    """Where n balls went in a control step: knots, and pieces between them.
+
+    A piece from p to q is straight, or with the bend b it is the parabola
+    ``p + s (q - p - b) + s^2 b``. Either is run through evenly in time, s from 0 to 1.
+
+    Attributes:
+        at: (n, K, p): the knots, metres, world frame, and with each the bend of the piece that
+            begins there, if pieces are bent; see `Columns`.
+        knots: (n,) how many there are.
+    """
+
+    at: Float64
+    knots: Int64
+
+
 class Physics(Protocol):
     """N worlds of one level: balls, and slabs that go down.
 
@@ -76,7 +95,7 @@ class Physics(Protocol):
         state: (N, width) float64, C-contiguous, live: all that a world's future depends on. What is
             written there counts from the next step on.
         columns: where everything is in it.
-        substeps: steps of `advance`, S, between which a path is kept.
+        substeps: steps of `advance`, S, in which `advance_late` counts.
     """
 
     state: Float64
@@ -86,15 +105,13 @@ class Physics(Protocol):
     def reset(self, worlds: Int64) -> None:
         """Put worlds back to where the level begins, at rest."""
 
-    def advance(self, worlds: Int64 | None) -> Float64:
+    def advance(self, worlds: Int64 | None) -> Path:
         """Advance worlds (all, if None) by a control step, and return where they went.
 
-        Returns:
-            (n, S + 1, p) before the first step and after each, metres, world frame; overwritten by
-            the next call.
+        The next call overwrites it.
         """
 
-    def advance_late(self, worlds: Int64 | None, still: Int64) -> Float64:
+    def advance_late(self, worlds: Int64 | None, still: Int64) -> Path:
         """Advance worlds as `advance` does, each after it has stood still for a while.
 
         Args:
@@ -103,7 +120,7 @@ class Physics(Protocol):
         """
 
     def diverged(self) -> Bool:
-        """Say which worlds, (N,), the engine has given up on since their last `reset`."""
+        """Say which worlds, (N,), are not finite, or given up on since their last `reset`."""
 
     def rays(
         self, offsets: Float64, directions: Float64, longest: float, worlds: Int64 | None

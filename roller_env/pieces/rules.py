@@ -104,10 +104,10 @@ class After(NamedTuple):
         level: row of the tables.
         env: row of the states.
         duration_s: of the step.
-        path: (S + 1, 3) the ball's centre before the first physics step and after each, metres.
-        end: physics steps until the game ended, ``inf`` if it did not.
-        entry: (R,) physics steps until the ball entered each region; ``inf`` where it did not, or
-            behind the end.
+        path: (S + 1, 3 or 6) the ball's way, as `roller_env.pieces.sweep` takes it, metres.
+        end: pieces of the path until the game ended, ``inf`` if it did not.
+        entry: (R,) pieces of the path until the ball entered each region; ``inf`` where it did not,
+            or behind the end.
         inside: (R,) which regions it is in at the end.
         displacement: (M,) how far the movers are from where they began, metres, <= 0.
         coins: (1,) to add to: how many coins the step has earned.

@@ -1,9 +1,19 @@
 """What does a moving ball meet, and when? Decided on the whole path, so nothing is jumped over.
 
+A path is S + 1 knots, and between each two a piece that is run through evenly in time. Its rows
+hold 3 numbers, the knot, where pieces are straight. They hold 6 where pieces are parabolas: a piece
+from p to q has the bend b, the next three numbers in the row of p, and goes through
+``p + s (q - p - b) + s^2 b`` for s from 0 to 1. Times count pieces: 2.5 is half-way through the
+third.
+
 A region is a rounded box: all points within a radius of a box, and higher than a floor. Along a
 straight piece of path the squared distance to the box is a convex and piecewise quadratic function
 of time, whose pieces meet where the path crosses the planes of the box's faces. So the time of
-entry is the root of one quadratic, and nothing has to be searched for.
+entry is the root of one quadratic, and nothing has to be searched for. On a parabola it is searched
+for by conservative advancement (B. Mirtich, *Impulse-based dynamic simulation of rigid body
+systems*, 1996): the plane through the nearest point of a convex region has all of the region behind
+it, so the time at which the parabola meets the plane is not after that of entry, and such times
+grow towards it.
 """
 
 from __future__ import annotations
@@ -22,16 +32,45 @@ POINT: Final[Vector] = (0.0, 0.0, 0.0)
 ANYWHERE: Final = -math.inf
 """The floor of a region without one."""
 
+WITHIN_M: Final = 1e-12
+"""On a parabola, what is this near to a region is in it."""
+
+_MOST_PLANES: Final = 64
+
 
 @device_function
 def time_of_fall(path: Float64, kill_height: float) -> float:
-    """Return the substep time at which the ball first is at or below the kill height."""
-    for step in range(len(path)):
-        after = path[step, 2]
-        if after <= kill_height:
-            before = path[max(step - 1, 0), 2]
-            return step - 1 + (before - kill_height) / (before - after) if step else 0.0
+    """Return the time at which the ball first is at or below the kill height, or ``inf``."""
+    if path[0, 2] <= kill_height:
+        return 0.0
+    for piece in range(len(path) - 1):
+        before, after = path[piece, 2], path[piece + 1, 2]
+        if path.shape[1] > 3:
+            bend = path[piece, 5]
+            share = _first_root(before - kill_height, after - before - bend, bend)
+            # A piece that ends there by less than rounding falls at its end.
+            if share <= 1.0 or after <= kill_height:
+                return piece + min(share, 1.0)
+        elif after <= kill_height:
+            time: float = piece + (before - kill_height) / (before - after)
+            return time
     return np.inf
+
+
+@device_function
+def _first_root(c: float, b: float, a: float) -> float:
+    """Return the first s >= 0 at which ``c + b s + a s^2``, at first above 0, is 0, or ``inf``."""
+    if a == 0.0:
+        share: float = -c / b if b < 0.0 else np.inf
+        return share
+    discriminant = b * b - 4.0 * a * c
+    if discriminant < 0.0:
+        return np.inf
+    root = math.sqrt(discriminant)
+    # Neither form subtracts numbers that are nearly equal.
+    if b < 0.0:
+        return 2.0 * c / (root - b)
+    return (b + root) / (-2.0 * a) if a < 0.0 else np.inf
 
 
 @device_function
@@ -42,7 +81,10 @@ def vector(array: Float64) -> Vector:
 
 @device_function
 def bounds(path: Float64) -> tuple[Vector, Vector]:
-    """Return the lowest and the highest corner of a path's bounding box."""
+    """Return the lowest and the highest corner of a box around a path.
+
+    A parabola lies within its ends and its control point as a quadratic Bezier curve.
+    """
     x0 = x1 = path[0, 0]
     y0 = y1 = path[0, 1]
     z0 = z1 = path[0, 2]
@@ -51,6 +93,14 @@ def bounds(path: Float64) -> tuple[Vector, Vector]:
         x0, x1 = min(x0, x), max(x1, x)
         y0, y1 = min(y0, y), max(y1, y)
         z0, z1 = min(z0, z), max(z1, z)
+    if path.shape[1] > 3:
+        for piece in range(len(path) - 1):
+            x = 0.5 * (path[piece, 0] + path[piece + 1, 0] - path[piece, 3])
+            y = 0.5 * (path[piece, 1] + path[piece + 1, 1] - path[piece, 4])
+            z = 0.5 * (path[piece, 2] + path[piece + 1, 2] - path[piece, 5])
+            x0, x1 = min(x0, x), max(x1, x)
+            y0, y1 = min(y0, y), max(y1, y)
+            z0, z1 = min(z0, z), max(z1, z)
     return (x0, y0, z0), (x1, y1, z1)
 
 
@@ -67,7 +117,7 @@ def meets(low: Vector, high: Vector, at: Vector, half: Vector, reach: float) -> 
 def visit(
     path: Float64, centre: Vector, half: Vector, radius: float, floor: float, touching: bool
 ) -> tuple[float, bool]:
-    """Return the time of the first entry, in substeps, and whether the path ends inside."""
+    """Return the time of the first entry, and whether the path ends inside."""
     time = np.inf
     start = _relative(path[0], centre)
     before = _depth(start, half, radius, floor)
@@ -79,9 +129,17 @@ def visit(
         if before > 0.0 and time == np.inf:
             way = (stop[0] - start[0], stop[1] - start[1], stop[2] - start[2])
             length = math.sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+            bend = POINT
+            if path.shape[1] > 3:
+                bend = (path[piece, 3], path[piece, 4], path[piece, 5])
+                # The control points' way is the longer one.
+                length += math.sqrt(bend[0] * bend[0] + bend[1] * bend[1] + bend[2] * bend[2])
             # The depth changes by at most a metre for each metre of way.
             if after <= 0.0 or before + after <= length:
-                share = _crossing(start, way, half, radius, floor)
+                if path.shape[1] > 3:
+                    share = _advanced(start, way, bend, half, radius, floor)
+                else:
+                    share = _crossing(start, way, half, radius, floor)
                 # A piece that ends inside by less than rounding enters at its end.
                 time = piece + (min(share, 1.0) if after <= 0.0 else share)
         start, before = stop, after
@@ -134,6 +192,50 @@ def _crossing(start: Vector, way: Vector, half: Vector, radius: float, floor: fl
         return np.inf
     if over_floor < near and height + share * way[2] < 0.0:
         return np.inf
+    return share
+
+
+@device_function
+def _advanced(
+    start: Vector, way: Vector, bend: Vector, half: Vector, radius: float, floor: float
+) -> float:
+    """Return the share, 0 to 1, of a bent piece at which it enters; ``inf`` for a miss.
+
+    Args:
+        start: outside the region, relative to its centre.
+        way: from there to the end of the piece.
+        bend: of the piece.
+        half: half edges of the box.
+        radius: of the rounding.
+        floor: lowest height over the centre.
+    """
+    share = 0.0
+    for _ in range(_MOST_PLANES):
+        x = start[0] + share * (way[0] - bend[0] + share * bend[0])
+        y = start[1] + share * (way[1] - bend[1] + share * bend[1])
+        z = start[2] + share * (way[2] - bend[2] + share * bend[2])
+        velocity = (
+            way[0] + (2.0 * share - 1.0) * bend[0],
+            way[1] + (2.0 * share - 1.0) * bend[1],
+            way[2] + (2.0 * share - 1.0) * bend[2],
+        )
+        out = (
+            x - min(max(x, -half[0]), half[0]),
+            y - min(max(y, -half[1]), half[1]),
+            z - min(max(z, -half[2]), half[2]),
+        )
+        distance = math.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])
+        beyond, under = distance - radius, floor - z
+        if max(beyond, under) <= WITHIN_M:
+            break
+        if beyond >= under:
+            approach = out[0] * velocity[0] + out[1] * velocity[1] + out[2] * velocity[2]
+            curve = out[0] * bend[0] + out[1] * bend[1] + out[2] * bend[2]
+            share += _first_root(beyond, approach / distance, curve / distance)
+        else:
+            share += _first_root(under, -velocity[2], -bend[2])
+        if share > 1.0:
+            return np.inf
     return share
 
 

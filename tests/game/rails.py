@@ -14,7 +14,7 @@ from roller_env.game.state import GameState
 from roller_env.game.step import Games, Rewarding
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level
-from roller_env.physics.protocol import Bodies, Columns
+from roller_env.physics.protocol import Bodies, Columns, Path
 from roller_env.pieces.coin import COIN
 from tests.builders import Vector
 
@@ -62,7 +62,9 @@ class Rails:
         self.time_s = 0.0
         movers = self.table.movers.stop.shape[1]
         # On rails the slabs trail nothing.
-        self.at = Columns(0, 3, 7, 10, 13, 13, 13 + movers, 16 + movers, movers, path=0)
+        self.at = Columns(
+            0, 3, 7, 10, 13, 13, 13 + movers, 16 + movers, movers, path=0, path_width=3
+        )
         self.physics = np.zeros((count, 16 + 2 * movers))
         self.bodies = Bodies.of(self.physics, self.at)
         self.bodies.position[:] = self.table.start
@@ -85,7 +87,8 @@ class Rails:
         games = self.games.concluding
         path = np.ascontiguousarray(path, dtype=np.float64)
         self.bodies.position[:] = path[:, -1]
-        step.conclude(games, self._every, self.step_s, path, self.physics, self.at, self._rewarding)
+        way = Path(path, np.full(len(path), path.shape[1]))
+        step.conclude(games, self._every, self.step_s, way, self.physics, self.at, self._rewarding)
         self.time_s += self.step_s
         found = self.games.step
         return Events(

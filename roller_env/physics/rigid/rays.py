@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 from roller_env.arrays import Float64, Int64
 from roller_env.physics.rigid.closest import from_centre, local
@@ -19,7 +19,7 @@ from roller_env.physics.rigid.kernels import (
     vector,
 )
 from roller_env.physics.rigid.scene import MARGIN_M, Scenes
-from roller_env.physics.rigid.states import States
+from roller_env.physics.rigid.states import POSITION, SLAB
 
 _PARALLEL: Final = 1e-15
 
@@ -28,7 +28,7 @@ _PARALLEL: Final = 1e-15
 def cast_rays(
     scenes: Scenes,
     level_of_row: Int64,
-    states: States,
+    states: Float64,
     rows: Int64,
     offsets: Float64,
     directions: Float64,
@@ -42,7 +42,7 @@ def cast_rays(
     Args:
         scenes: the solids.
         level_of_row: (N,) which level each ball is in.
-        states: where the balls and slabs are.
+        states: (N, width) where the balls and slabs are, as `States.packed`.
         rows: (n,) which balls.
         offsets: (R, 3) where each ray begins, from the ball's centre, metres, world frame.
         directions: (R, 3) unit vectors, world frame.
@@ -52,20 +52,18 @@ def cast_rays(
     for place in range(len(rows)):
         number = rows[place]
         level = scenes.level[level_of_row[number]]
-        ball = row(states.position, number)
+        body = states[number]
+        ball = vector(body[POSITION:])
         for ray in range(len(directions)):
             origin = add(ball, row(offsets, ray))
-            out[place, ray] = _first(
-                scenes, level, states.slab, number, origin, row(directions, ray), longest
-            )
+            out[place, ray] = _first(scenes, level, body, origin, row(directions, ray), longest)
 
 
 @inlined
 def _first(
     scenes: Scenes,
     level: Record,
-    slab: Float64,
-    number: int,
+    body: Any,
     origin: Vector,
     direction: Vector,
     longest: float,
@@ -89,7 +87,7 @@ def _first(
             cell = level.first_cell + x * level.grid[1] + y
             for place in range(scenes.cell_start[cell], scenes.cell_start[cell + 1]):
                 solid = scenes.solid[scenes.cell_solid[place]]
-                shift = slab[number, solid.slab] if solid.slab >= 0 else 0.0
+                shift = body[SLAB + solid.slab] if solid.slab >= 0 else 0.0
                 if _may_meet(solid, shift, origin, direction):
                     relative = from_centre(solid, shift, origin)
                     nearest = min(nearest, _into(solid, relative, direction))

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from roller_env.physics.rigid.kernels import Records, inlined
 from roller_env.physics.rigid.scene import Scenes
-from roller_env.physics.rigid.states import Commands, States
+from roller_env.physics.rigid.states import SLAB
 
 
 @inlined
-def set_going(
-    scenes: Scenes, level: int, states: States, commands: Commands, row: int, slabs: Records
-) -> None:
-    """Write where the slabs of a ball's level are, and how fast they move."""
+def set_going(scenes: Scenes, level: int, body: Any, slabs: Records) -> None:
+    """Write where the slabs of a ball's level are, and how fast they move, by its packed state."""
     for k in range(len(slabs)):
         slab = slabs[k]
-        slab.shift, slab.stop = states.slab[row, k], scenes.slab_stop[level, k]
-        speed = commands.slab_velocity[row, k]
+        slab.shift, slab.stop = body[SLAB + k], scenes.slab_stop[level, k]
+        speed = body[SLAB + scenes.slab_stop.shape[1] + k]
         ended = slab.shift <= slab.stop if speed < 0.0 else slab.shift >= 0.0
         slab.speed = 0.0 if ended else speed
 

@@ -1,34 +1,41 @@
-"""The state of N balls and of the slabs of their levels."""
+"""The state of N balls and of the slabs of their levels, and what is done to them."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from roller_env.arrays import Float64, Int64
 from roller_env.physics.rigid.scene import Scenes
 
+POSITION: Final = 0
+ORIENTATION: Final = 3
+VELOCITY: Final = 7
+SPIN: Final = 10
+FORCE: Final = 13
+DELAY: Final = 16
+SLAB: Final = 17
+"""Where things begin in a row of `States.packed`. Behind the slabs' displacements are their
+velocities."""
+
 
 class States(NamedTuple):
     """All that the future of N balls depends on. SI units, world frame unless said.
 
-    Copying a row of each array, and of `level_of_row`, back restores it exactly.
+    Kernels take `packed`; the others are views of it. Copying a row of it, and of the balls'
+    levels, back restores it exactly.
     """
 
+    packed: Float64  # (N, 17 + 2 P)
     position: Float64  # (N, 3) centres
-    velocity: Float64  # (N, 3)
     orientation: Float64  # (N, 4) unit quaternion (w, x, y, z), ball frame to world frame
+    velocity: Float64  # (N, 3)
     spin: Float64  # (N, 3) angular velocity in the ball's own frame
+    force: Float64  # (N, 3) newtons on the centre besides gravity, during the next step
+    delay: Float64  # (N,) seconds for which the next step leaves ball and slabs alone; it ends that
     slab: Float64  # (N, P) displacement of each slab along z, <= 0
-
-
-class Commands(NamedTuple):
-    """What is done to N balls during a step."""
-
-    force: Float64  # (N, 3) newtons on the centre besides gravity, world frame
-    slab_velocity: Float64  # (N, P) m/s along z at which each slab is to move
-    delay: Float64  # (N,) seconds for which ball and slabs stand still before the step begins
+    slab_velocity: Float64  # (N, P) m/s along z at which each slab is to move in the next step
 
 
 class Counts(NamedTuple):
@@ -41,22 +48,20 @@ class Counts(NamedTuple):
 
 
 def make_states(scenes: Scenes, count: int) -> States:
-    """Return ``count`` balls at rest at the origin."""
+    """Return ``count`` balls at rest at the origin, on which nothing acts."""
+    slabs = scenes.slab_stop.shape[1]
+    packed = np.zeros((count, SLAB + 2 * slabs))
+    packed[:, ORIENTATION] = 1.0
     return States(
-        position=np.zeros((count, 3)),
-        velocity=np.zeros((count, 3)),
-        orientation=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-        spin=np.zeros((count, 3)),
-        slab=np.zeros((count, scenes.slab_stop.shape[1])),
-    )
-
-
-def make_commands(scenes: Scenes, count: int) -> Commands:
-    """Return no force, slabs that stand, and no delay."""
-    return Commands(
-        force=np.zeros((count, 3)),
-        slab_velocity=np.zeros((count, scenes.slab_stop.shape[1])),
-        delay=np.zeros(count),
+        packed=packed,
+        position=packed[:, POSITION : POSITION + 3],
+        orientation=packed[:, ORIENTATION : ORIENTATION + 4],
+        velocity=packed[:, VELOCITY : VELOCITY + 3],
+        spin=packed[:, SPIN : SPIN + 3],
+        force=packed[:, FORCE : FORCE + 3],
+        delay=packed[:, DELAY],
+        slab=packed[:, SLAB : SLAB + slabs],
+        slab_velocity=packed[:, SLAB + slabs :],
     )
 
 

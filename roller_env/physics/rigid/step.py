@@ -46,9 +46,8 @@ from roller_env.physics.rigid.kernels import (
     norm,
     plus,
     position_at,
-    put,
-    row,
     scaled,
+    store,
     sub,
     vector,
 )
@@ -63,9 +62,19 @@ from roller_env.physics.rigid.motion import (
     without_gain,
 )
 from roller_env.physics.rigid.near import gather, look_ahead, time_within, touch, weld
+from roller_env.physics.rigid.path import begin, bend_through, follow
 from roller_env.physics.rigid.scene import MARGIN_M, Scenes
 from roller_env.physics.rigid.slabs import move_slabs, set_going, time_to_stop
-from roller_env.physics.rigid.states import Commands, Counts, States
+from roller_env.physics.rigid.states import (
+    DELAY,
+    FORCE,
+    ORIENTATION,
+    POSITION,
+    SLAB,
+    SPIN,
+    VELOCITY,
+    Counts,
+)
 from roller_env.physics.rigid.workspace import Workspace
 
 MOST_SEGMENTS: Final = 200
@@ -98,12 +107,12 @@ class Course(NamedTuple):
 def advance(
     scenes: Scenes,
     level_of_row: Int64,
-    states: States,
-    commands: Commands,
+    states: Float64,
     rows: Int64,
     duration: float,
     cap: float,
     path: Float64,
+    knots: Int64,
     counts: Counts,
     workspace: Workspace,
     thread: int,
@@ -113,12 +122,13 @@ def advance(
     Args:
         scenes: what they meet.
         level_of_row: (N,) which level each ball is in.
-        states: where they are; changed in place.
-        commands: what is done to them.
+        states: (N, width) where they are, and what is done to them, as `States.packed`; changed in
+            place.
         rows: (n,) which of them to move.
         duration: of the control step, seconds.
         cap: longest step of RK4, seconds.
-        path: (N, S + 1, 3) receives the centres at the start and after each S-th of the step.
+        path: (n, K, 6) receives the ways of the centres: see `roller_env.physics.rigid.path`.
+        knots: (n,) receives how many knots each has.
         counts: counted up.
         workspace: made for the scenes.
         thread: which of its memories to use; no other thread may use it meanwhile.
@@ -129,26 +139,28 @@ def advance(
         level_number = level_of_row[number]
         level = scenes.level[level_number]
         slabs = workspace.slab[thread, : level.slabs]
-        set_going(scenes, level_number, states, commands, number, slabs)
-        force = row(commands.force, number)
+        body = states[number]
+        set_going(scenes, level_number, body, slabs)
+        force = vector(body[FORCE:])
         pull = (
             force[0] / level.mass,
             force[1] / level.mass,
             force[2] / level.mass - level.gravity,
         )
-        orientation = states.orientation[number]
-        spin = turned(orientation, row(states.spin, number))
-        ball = Ball(row(states.position, number), row(states.velocity, number), spin)
+        orientation = body[ORIENTATION:]
+        spin = turned(orientation, vector(body[SPIN:]))
+        ball = Ball(vector(body[POSITION:]), vector(body[VELOCITY:]), spin)
         work.segments = work.forced = work.unsolved = work.blocked = 0
-        delay = min(commands.delay[number], duration)
-        ball = _advance_ball(
-            scenes, level, slabs, work, ball, orientation, pull, delay, duration, cap, path[number]
+        delay = min(body[DELAY], duration)
+        ball, knots[place] = _advance_ball(
+            scenes, level, slabs, work, ball, orientation, pull, delay, duration, cap, path[place]
         )
-        put(states.position, number, ball.position)
-        put(states.velocity, number, ball.velocity)
-        put(states.spin, number, turned_back(orientation, ball.spin))
+        store(body[POSITION:], ball.position)
+        store(body[VELOCITY:], ball.velocity)
+        store(body[SPIN:], turned_back(orientation, ball.spin))
+        body[DELAY] = 0.0
         for k in range(len(slabs)):
-            states.slab[number, k] = slabs[k].shift
+            body[SLAB + k] = slabs[k].shift
         counts.segments[number] += work.segments
         counts.forced[number] += work.forced
         counts.unsolved[number] += work.unsolved
@@ -168,14 +180,13 @@ def _advance_ball(
     duration: float,
     cap: float,
     path: Any,
-) -> Ball:
-    """Return a ball after a control step; turn its orientation, in place."""
+) -> tuple[Ball, int]:
+    """Return a ball after a control step, and how many knots its path has.
+
+    Its orientation is turned in place.
+    """
     radius, solids = level.radius, scenes.solid
-    put(path, 0, ball.position)
-    sampled = 1
-    while sampled < len(path) and sampled * duration <= delay * (len(path) - 1):
-        put(path, sampled, ball.position)
-        sampled += 1
+    knots = begin(path, ball.position)
     time = delay
     centre, listed = ball.position, -1.0  # what is listed as near is so around this place
     force = norm(pull)
@@ -202,23 +213,18 @@ def _advance_ball(
             course = _at(course, max(course.until, min(rest, FORCED_STEP_S)))
             work.forced += 1
         after = _move(work, solids, motion, radius, ball, pull, course)
-        sampled = _sample(
-            work, motion.kind, radius, ball, after, pull, course, path, sampled, time, duration
-        )
+        knots = _leave(work, motion.kind, radius, ball, after, pull, course, cap, path, knots)
         turn(orientation, ball.spin, after.spin, course.until)
         ball = after
         move_slabs(slabs, course.until)
         time += course.until
         if duration - time < SHORTEST_S:
             time = duration
-    while sampled < len(path):
-        put(path, sampled, ball.position)
-        sampled += 1
-    return ball
+    return ball, knots
 
 
 @inlined
-def _sample(
+def _leave(
     work: Record,
     kind: int,
     radius: float,
@@ -226,19 +232,29 @@ def _sample(
     after: Ball,
     pull: Vector,
     course: Course,
+    cap: float,
     path: Any,
-    sampled: int,
-    time: float,
-    duration: float,
+    knots: int,
 ) -> int:
-    """Write where a ball is on its course at the next S-ths of the step; return which is next."""
-    piece = duration / (len(path) - 1)
-    end = (time + course.until) * (1.0 + 1e-15)
-    while sampled < len(path) and sampled * piece <= end:
-        at = sampled * piece - time
-        put(path, sampled, _between(work, kind, radius, ball, after, pull, course, at))
-        sampled += 1
-    return sampled
+    """Add a course that ends at ``after`` to the ball's path; return how many knots that has.
+
+    What is no parabola is left as parabolas through their ends and middles, two for each time of
+    the cap.
+    """
+    time = course.until
+    if kind in (PARABOLA, STEP):
+        bend = scaled(0.5 * time * time, course.acceleration)
+        return follow(path, knots, after.position, bend)
+    pieces = 1 + int(2.0 * time / cap)
+    for piece in range(pieces):
+        to = after.position
+        if piece < pieces - 1:
+            at = (piece + 1) * time / pieces
+            to = _between(work, kind, radius, ball, after, pull, course, at)
+        at = (piece + 0.5) * time / pieces
+        middle = _between(work, kind, radius, ball, after, pull, course, at)
+        knots = follow(path, knots, to, bend_through(path, knots, middle, to))
+    return knots
 
 
 @inlined
@@ -252,12 +268,10 @@ def _between(
     course: Course,
     time: float,
 ) -> Vector:
-    """Return where a ball is ``time`` after it set out on a course that ends at ``after``."""
+    """Return where a ball is on a curve or skid, ``time`` after it set out towards ``after``."""
     if kind == SKID:
         return skid(work.contact[0], radius, ball, pull, time).position
-    if kind == CURVE:
-        return hermite(ball, after, course.until, time)
-    return position_at(ball.position, ball.velocity, course.acceleration, time)
+    return hermite(ball, after, course.until, time)
 
 
 @inlined

@@ -21,7 +21,7 @@ def test_a_ball_does_not_feel_the_seams_of_a_floor_of_tiles(speed: float) -> Non
     ]
     spin = (0.0, speed / RADIUS_M, 0.0)
     world = World(tiles).put((0.0, 0.013, RESTING_M), (speed, 0.0, 0.0), spin).run(1.0)
-    assert world.path[0, :, 2] == pytest.approx(RESTING_M, abs=NANOMETRE)
+    assert world.way()[:, 2] == pytest.approx(RESTING_M, abs=NANOMETRE)
     assert world.states.velocity[0] == pytest.approx([speed, 0.0, 0.0], abs=1e-9)
 
 

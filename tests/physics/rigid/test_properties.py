@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from roller_env.compile.compiled import compile_level
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.physics.rigid.scene import SolidBox, pack
-from roller_env.physics.rigid.states import make_commands, make_counts, make_states
+from roller_env.physics.rigid.states import make_counts, make_states
 from roller_env.physics.rigid.step import advance
 from roller_env.physics.rigid.workspace import make_workspace
 from roller_env.physics.stepper import Stepper
@@ -64,17 +64,28 @@ def test_until_it_meets_a_second_solid_a_ball_is_where_mujoco_has_it(name: str) 
     keys = KEY_M_S2 * np.array([(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)], dtype=float)
     stepper = Stepper(compiled.model, len(keys), steps, 1)
     scenes = pack([rigid])
-    states, commands = make_states(scenes, len(keys)), make_commands(scenes, len(keys))
+    states = make_states(scenes, len(keys))
     states.position[:] = level.start.at
-    path, counts = np.zeros((len(keys), 2, 3)), make_counts(len(keys))
+    path, counts = np.zeros((len(keys), 60, 6)), make_counts(len(keys))
     workspace, rows = make_workspace(scenes), np.arange(len(keys))
+    knots = np.zeros(len(keys), dtype=np.int64)
     for part in range(10):
         force = np.roll(keys, part // 5, axis=0) * level.ball.mass_kg
-        commands.force[:, :2] = force
+        states.force[:, :2] = force
         stepper.ctrl[:, compiled.force_ctrl[:2]] = force
         stepper.advance()
         advance(
-            scenes, rows * 0, states, commands, rows, STEP_S, 1 / 120, path, counts, workspace, 0
+            scenes,
+            rows * 0,
+            states.packed,
+            rows,
+            STEP_S,
+            1 / 120,
+            path,
+            knots,
+            counts,
+            workspace,
+            0,
         )
         places = stepper.qpos[:, ball : ball + 3]
         # A rolling ball keeps its height; what has left it has met, or left, something.

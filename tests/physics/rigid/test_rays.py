@@ -41,7 +41,7 @@ def test_rays_among_packed_levels_meet_what_those_of_mujoco_meet(number: int) ->
         (scan_offsets(), down, np.inf),
     ):
         found = np.empty((BALLS, len(directions)))
-        cast_rays(scenes, level_of_row, states, rows, offsets, directions, longest, found)
+        cast_rays(scenes, level_of_row, states.packed, rows, offsets, directions, longest, found)
         origins = states.position[:, None, :] + offsets
         wanted = stepper.rays(origins, directions, compiled.ball_body)
         wanted[wanted > longest] = np.inf

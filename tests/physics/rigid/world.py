@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from roller_env.physics.rigid.scene import RigidLevel, Scenes, SolidBox, pack
-from roller_env.physics.rigid.states import make_commands, make_counts, make_states
+from roller_env.physics.rigid.states import States, make_counts, make_states
 from roller_env.physics.rigid.step import advance
 from roller_env.physics.rigid.workspace import make_workspace
 
@@ -45,9 +46,9 @@ class World:
 
     Attributes:
         scenes: what they meet.
-        states: where they are.
-        commands: the force on each, and the slabs' velocities.
-        path: (N, S + 1, 3) centres of the last step.
+        states: where they are, and what is done to them.
+        path: (N, K, 6) their ways in the last step.
+        knots: (N,) how many knots each has.
         counts: what the steps took.
     """
 
@@ -58,14 +59,13 @@ class World:
         *,
         slab_stop: Sequence[float] = (),
         cap_s: float = CAP_S,
-        samples: int = 12,
     ):
         level = RigidLevel(boxes, RADIUS_M, GRAVITY, slab_stop=slab_stop)
         self.scenes: Scenes = pack([level])
         self.states = make_states(self.scenes, count)
-        self.commands = make_commands(self.scenes, count)
         self.counts = make_counts(count)
-        self.path = np.zeros((count, samples + 1, 3))
+        self.path = np.zeros((count, 300, 6))
+        self.knots = np.zeros(count, dtype=np.int64)
         self.cap_s = cap_s
         self._workspace = make_workspace(self.scenes)
         self._level_of_row = np.zeros(count, dtype=np.int64)
@@ -87,7 +87,7 @@ class World:
     def run(self, time_s: float, force: Sequence[float] | None = None) -> World:
         """Let time pass in control steps; return this."""
         if force is not None:
-            self.commands.force[:] = force
+            self.states.force[:] = force
         for _ in range(round(time_s / STEP_S)):
             self.step()
         return self
@@ -97,16 +97,30 @@ class World:
         advance(
             self.scenes,
             self._level_of_row,
-            self.states,
-            self.commands,
+            self.states.packed,
             self._rows,
             STEP_S,
             self.cap_s,
             self.path,
+            self.knots,
             self.counts,
             self._workspace,
             0,
         )
+
+    def way(self, row: int = 0, points: int = 50) -> Float64:
+        """Return the places, (K, 3), that a ball came through in the last step."""
+        path = self.path[row, : self.knots[row]]
+        s = np.linspace(0.0, 1.0, points)[:, None]
+        pieces = [path[:1, :3]]
+        for (p, b), (q, _) in pairwise(path.reshape(-1, 2, 3)):
+            pieces.append(p + s * (q - p - b) + s**2 * b)
+        return np.concatenate(pieces)
+
+    @property
+    def commands(self) -> States:
+        """What is done to the balls."""
+        return self.states
 
     @property
     def angular_velocity(self) -> Float64:
