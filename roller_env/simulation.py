@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from roller_env import checks
 from roller_env.arrays import Bool, Float32, Float64, Int64
+from roller_env.compiled import Bound
 from roller_env.config import MAX_ENVS, EnvConfig
 from roller_env.divergence import report
 from roller_env.game import observations, step
@@ -196,6 +197,12 @@ class Simulation:
         self._rewarding = Rewarding(
             np.array(config.reward_weights.terms), config.reward == "shaped", config.discount
         )
+        physics, games = self._physics.state, self._games
+        self._prepare = Bound(step.prepare, games.preparing, physics, self._at, self._duration_s)
+        self._conclude = Bound(
+            step.conclude, games.concluding, physics, self._at, self._duration_s, self._rewarding
+        )
+        self._observe = Bound(step.observe, games.showing, physics, self._at)
         self._every = np.arange(num_envs)
         self._ray_directions = observations.ray_directions()
         self._scan_offsets = observations.scan_offsets()
@@ -459,15 +466,14 @@ class Simulation:
         """Step ``rows``; None: all."""
         every: Int64 | slice = slice(None) if rows is None else rows
         envs = self._every if rows is None else rows
-        games, duration_s, physics = self._games, self.duration_s, self._physics.state
-        step.prepare(games.preparing, envs, duration_s, force_n, physics, self._at)
-        before = physics[every].copy()
-        hanging = games.hanging_s[every]
+        self._prepare(envs, force_n)
+        before = self._physics.state[every].copy()
+        hanging = self._games.hanging_s[every]
         path = self._let_go(rows, hanging) if hanging.any() else self._physics.advance(rows)
         diverged = self._physics.diverged()[every]
         if diverged.any():
             self._end_diverged(envs[diverged], path, diverged, before)
-        step.conclude(games.concluding, envs, duration_s, path, physics, self._at, self._rewarding)
+        self._conclude(envs, path.at, path.knots)
 
     def _let_go(self, rows: Int64 | None, hanging_s: Float64) -> Path:
         """Advance rows of which some begin to move only after ``hanging_s``, (n,); return paths."""
@@ -529,7 +535,7 @@ class Simulation:
         envs = self._every if rows is None else np.asarray(rows)
         size = sum(entry.size for entry in observations.entries(self.config.observation))
         out = np.zeros((len(envs), size), dtype=np.float32)
-        step.observe(self._games.showing, envs, self._physics.state, self._at, out)
+        self._observe(envs, out)
         if self.config.observation == "rays":
             out[:, observations.STATE_SIZE :] = self._cast_rays(rows, envs)
         return out

@@ -24,7 +24,7 @@ from roller_env.game.rewards import ShapingState, next_waypoint, route_progress,
 from roller_env.game.slabs import lowering
 from roller_env.game.state import GameState
 from roller_env.game.tables import LevelTable, Movers, Regions, Routes
-from roller_env.physics.protocol import Columns, Path
+from roller_env.physics.protocol import Columns
 from roller_env.pieces.rules import WORK, After, Before, CameraAsked, Noticed, Seen
 from roller_env.pieces.sweep import bounds, meets, time_of_fall, vector, visit
 from roller_env.units import frames
@@ -57,8 +57,8 @@ class Step(NamedTuple):
         entry: (N, R) pieces of the path until the ball entered each region and it counted; ``inf``
             where it did not.
         inside: (N, R) which regions it is in at the end.
-        end: (N,) pieces of the path until the finish or the fall; ``inf`` if neither, -``inf`` where
-            the step does not count.
+        end: (N,) pieces of the path until the finish or the fall; ``inf`` if neither, -``inf``
+            where the step does not count.
         fell: (N,) whether the ball fell, be the game over or not.
         coins: (N, 1) how many coins were collected.
         terms: (N, terms) what the step has earned, by `roller_env.game.result.REWARD_TERMS`.
@@ -254,11 +254,11 @@ class Games:
 @kernel
 def prepare(
     games: Preparing,
-    envs: Int64,
-    duration_s: float,
-    key_force_n: Float64,
     physics: Float64,
     at: Columns,
+    duration_s: float,
+    envs: Int64,
+    key_force_n: Float64,
 ) -> None:
     """Write what the motors of some envs do in the next step, given the keys' force.
 
@@ -267,11 +267,11 @@ def prepare(
 
     Args:
         games: all of them.
-        envs: (n,) which of them.
-        duration_s: of the step.
-        key_force_n: (N, 2) newtons, world x and y.
         physics: (N, width) the state of the physics; its controls are written.
         at: where everything is in it.
+        duration_s: of the step.
+        envs: (n,) which of them.
+        key_force_n: (N, 2) newtons, world x and y.
     """
     for env in envs:
         level, delay_s = games.level_of[env], games.control_delay_s[env]
@@ -297,12 +297,13 @@ def prepare(
 @kernel
 def conclude(
     games: Concluding,
-    envs: Int64,
-    duration_s: float,
-    path: Path,
     physics: Float64,
     at: Columns,
+    duration_s: float,
     rewarding: Rewarding,
+    envs: Int64,
+    path: Float64,
+    knots: Int64,
 ) -> None:
     """Draw the consequences of a step in some envs, and say what it was worth.
 
@@ -312,17 +313,18 @@ def conclude(
 
     Args:
         games: all of them.
-        envs: (n,) which of them.
-        duration_s: of the step.
-        path: where their balls went.
         physics: (N, width) the state of the physics now; a ball put back is written there.
-        at: where everything is in both.
+        at: where everything is in it, and in the path.
+        duration_s: of the step.
         rewarding: what it is worth.
+        envs: (n,) which of them.
+        path: (n, K, p) where their balls went, as `roller_env.physics.protocol.Path` has it.
+        knots: (n,) how many knots each path has.
     """
     state, step = games.state, games.step
     for number in range(len(envs)):
         env = envs[number]
-        way = path.at[number, : path.knots[number], at.path : at.path + at.path_width]
+        way = path[number, : knots[number], at.path : at.path + at.path_width]
         level = games.level_of[env]
         _find_events(games, level, env, duration_s, way)
         state.steps[env] += 1
@@ -487,14 +489,14 @@ def follow_route(
 
 
 @kernel
-def observe(games: Showing, envs: Int64, physics: Float64, at: Columns, out: Float32) -> None:
+def observe(games: Showing, physics: Float64, at: Columns, envs: Int64, out: Float32) -> None:
     """Write the state vectors of some envs.
 
     Args:
         games: all of them.
-        envs: (n,) which of them.
         physics: (N, width) the state of the physics.
         at: where everything is in it.
+        envs: (n,) which of them.
         out: (n, `STATE_SIZE` or more) laid out as `STATE_ENTRIES`; zeros.
     """
     for number in range(len(envs)):

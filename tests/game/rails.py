@@ -14,7 +14,7 @@ from roller_env.game.state import GameState
 from roller_env.game.step import Games, Rewarding
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level
-from roller_env.physics.protocol import Bodies, Columns, Path
+from roller_env.physics.protocol import Bodies, Columns
 from roller_env.pieces.coin import COIN
 from tests.builders import Vector
 
@@ -76,7 +76,7 @@ class Rails:
         """Let the motors be told what to do in the next step, without keys."""
         keys = np.zeros((len(self._every), 2))
         games = self.games.preparing
-        step.prepare(games, self._every, self.step_s, keys, self.physics, self.at)
+        step.prepare(games, self.physics, self.at, self.step_s, self._every, keys)
 
     def follow(self, path: Float64) -> Events:
         """Let one control step pass on a path, (N, S + 1, 3) metres; struck plates sink."""
@@ -87,8 +87,9 @@ class Rails:
         games = self.games.concluding
         path = np.ascontiguousarray(path, dtype=np.float64)
         self.bodies.position[:] = path[:, -1]
-        way = Path(path, np.full(len(path), path.shape[1]))
-        step.conclude(games, self._every, self.step_s, way, self.physics, self.at, self._rewarding)
+        knots, envs = np.full(len(path), path.shape[1]), self._every
+        fixed = games, self.physics, self.at, self.step_s, self._rewarding
+        step.conclude(*fixed, envs, path, knots)
         self.time_s += self.step_s
         found = self.games.step
         return Events(
