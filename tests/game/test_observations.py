@@ -142,7 +142,7 @@ def test_a_ball_that_is_nowhere_sees_no_coin_and_does_not_disturb_the_others() -
     rails = Rails(*[make_level(coins=[coin(*resting(2.0)), coin(*resting(7.0))])] * 2)
     rails.bodies.position[:] = [[np.nan, 0.0, 1.0], [1.0, 0.0, 1.0]]
     out = np.zeros((2, STATE_SIZE), dtype=np.float32)
-    observe(rails.games.showing, np.arange(2), rails.physics, rails.at, out)
+    observe(rails.games.showing, rails.physics, rails.at, np.arange(2), out)
     np.testing.assert_array_equal(
         split(out, STATE_ENTRIES)["coins_present"], [[0, 0, 0, 0], [1, 1, 0, 0]]
     )

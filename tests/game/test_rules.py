@@ -208,7 +208,7 @@ def test_an_env_plays_the_level_that_it_is_said_to_play() -> None:
     games = Games(LevelTable.of_levels([near, far]), np.array([1, 0, 1]), np.full(3, 100))
     rails = Rails(near, near, near)
     out = np.zeros((3, STATE_SIZE), dtype=np.float32)
-    observe(games.showing, np.arange(3), rails.physics, rails.at, out)
+    observe(games.showing, rails.physics, rails.at, np.arange(3), out)
     finish = split(out, STATE_ENTRIES)["finish"]
     np.testing.assert_array_equal(finish[:, 0], [50.5, 10.5, 50.5])
 
