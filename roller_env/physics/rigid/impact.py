@@ -30,6 +30,10 @@ CHATTER_M_S: Final = 1e-3
 """The same where several contacts touch. Friction at one lifts the ball off another, and a ball
 that comes to rest in a corner would do so through ever smaller hops without end."""
 
+LIFTED_M_S: Final = 1e-4
+"""The same of one contact whose slip makes it open: what opens more slowly falls back before it has
+risen by a contact's gap (v^2 / 2g), so that such a slip is Coulomb's."""
+
 REST_M_S: Final = 1e-3
 """An impact slower than this is plastic, whatever the elasticity: the bounces end."""
 
@@ -69,9 +73,20 @@ def calmed(before: Twist, after: Twist, radius: float) -> Twist:
 
 
 @kernel
-def closed_m_s(count: int) -> float:
-    """Return the normal velocity below which one of ``count`` contacts is held."""
-    return CLOSED_M_S if count == 1 else CHATTER_M_S
+def closed_m_s(work: Record, count: int) -> float:
+    """Return the normal velocity below which ``count`` contacts are held."""
+    if count > 1:
+        return CHATTER_M_S
+    return CLOSED_M_S if work.contact[0].dilatancy == 0.0 else LIFTED_M_S
+
+
+@kernel
+def closing(contact: Record, radius: float, twist: Twist) -> float:
+    """Return how fast a contact closes, or slips without opening as the law asks for, m/s."""
+    approach = -opening(contact, twist.linear)
+    if contact.dilatancy > 0.0:
+        approach += contact.dilatancy * norm(true_slip(contact, radius, twist))
+    return approach
 
 
 @inlined
@@ -83,9 +98,9 @@ def collide(
     A moving slab that would have to pass through the ball stands still for the rest of the step:
     what squeezes a rigid ball against something rigid is held up by it.
     """
-    approaches = False
+    approaches, most = False, closed_m_s(work, count)
     for i in range(count):
-        approaches = approaches or opening(work.contact[i], twist.linear) < -closed_m_s(count)
+        approaches = approaches or closing(work.contact[i], radius, twist) > most
     if not approaches:
         return twist, True, 0
     fastest, moving = norm(twist.linear) + radius * norm(twist.angular), False
@@ -95,6 +110,9 @@ def collide(
         contact.slides = 0
         approach = opening(contact, twist.linear)
         contact.bias = -contact.elasticity * approach if approach < -REST_M_S else 0.0
+        if contact.reversal > 0.0 and approach < -REST_M_S:
+            back = true_slip(contact, radius, twist)
+            store(contact.surface, plus((0.0, 0.0, contact.rise), -contact.reversal, back))
         moving = moving or contact.rise != 0.0
         fastest = max(fastest, abs(contact.rise))
     after, solved = solve(work, count, radius, twist, EXACT)
@@ -117,7 +135,7 @@ def collide(
 @inlined
 def keep_closed(work: Record, count: int, v: Vector) -> int:
     """Leave out contacts that open; return how many are left."""
-    fastest = closed_m_s(count)
+    fastest = closed_m_s(work, count)
     i = none_of(count)
     while i < count:
         if opening(work.contact[i], v) > fastest:

@@ -123,7 +123,8 @@ def touch(solids: Records, slabs: Records, work: Record, radius: float, position
                 store(contact.pivot, plus(position, -distance, normal))
                 if kind == EDGE:
                     store(contact.edge, row(solid.axes, axis))
-            contact.friction, contact.elasticity = solid.friction, solid.elasticity
+            contact.friction, contact.dilatancy = solid.friction, solid.dilatancy
+            contact.elasticity, contact.reversal = solid.elasticity, solid.reversal
             count += 1
     return count
 

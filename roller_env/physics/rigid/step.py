@@ -29,6 +29,7 @@ from roller_env.physics.rigid.holding import (
     Motion,
     choose_motion,
     end_slip,
+    lift_off_time,
     slip_time,
     slips_end,
 )
@@ -317,6 +318,7 @@ def _plan(
     """Return the course of a ball that meets nothing, no further than ``way``."""
     holding, twist = motion.holding, Twist(ball.velocity, ball.spin)
     # Spin and wedges can drive a ball faster than forces alone.
+    left = min(left, lift_off_time(work, solids, holding, radius, motion.rates))
     changes = 1.0 if motion.kind == PARABOLA or motion.kind == STEP else 2.0
     left = time_within(way, norm(ball.velocity), changes * norm(motion.rates.linear), left)
     if motion.kind == PARABOLA:
