@@ -49,11 +49,13 @@ from roller_env.physics.rigid.linear import eliminate
 
 EXACT: Final = 1e-9
 
+SLIP_PER_IMPULSE: Final = 3.5
+"""By how much a unit of drag changes the slip of its own contact: 1 + 5/2."""
+
 OPEN: Final = 0
 STICKS: Final = 1
 SLIPS: Final = 2
 
-_SLIP_PER_IMPULSE: Final = 3.5
 _SPIN_PER_IMPULSE: Final = 2.5
 _FIRST_SWEEPS: Final = 8
 _MOST_ATTEMPTS: Final = 8
@@ -225,7 +227,7 @@ def _sweep(work: Record, count: int, radius: float, twist: Twist) -> tuple[Twist
             drag = scaled(-most, vector(contact.direction))
             contact.status = SLIPS
         else:
-            drag = plus(old, -1.0 / _SLIP_PER_IMPULSE, slip(contact, radius, twist))
+            drag = plus(old, -1.0 / SLIP_PER_IMPULSE, slip(contact, radius, twist))
             size = norm(drag)
             contact.status = STICKS
             if size > most:
@@ -242,6 +244,13 @@ def _sweep(work: Record, count: int, radius: float, twist: Twist) -> tuple[Twist
 
 
 @kernel
+def slip_response(contact: Record) -> float:
+    """Return by how much a unit of push changes ``w - d |u|`` where it slips; see `_alone`."""
+    response: float = 1.0 + SLIP_PER_IMPULSE * contact.friction * contact.dilatancy
+    return response
+
+
+@kernel
 def _alone(contact: Record, radius: float, twist: Twist) -> tuple[float, Vector]:
     """Return push and drag of a contact whose slip makes it open, given the others; its status.
 
@@ -251,16 +260,16 @@ def _alone(contact: Record, radius: float, twist: Twist) -> tuple[float, Vector]
     """
     old, mu, dilatancy = vector(contact.drag), contact.friction, contact.dilatancy
     free = excess(contact, twist.linear) - contact.push
-    u = plus(slip(contact, radius, twist), -_SLIP_PER_IMPULSE, old)
+    u = plus(slip(contact, radius, twist), -SLIP_PER_IMPULSE, old)
     speed = norm(u)
     contact.status = OPEN
     if free >= dilatancy * speed:
         return 0.0, (0.0, 0.0, 0.0)
     contact.status = STICKS
-    if speed <= -_SLIP_PER_IMPULSE * mu * free:
-        return -free, scaled(-1.0 / _SLIP_PER_IMPULSE, u)
+    if speed <= -SLIP_PER_IMPULSE * mu * free:
+        return -free, scaled(-1.0 / SLIP_PER_IMPULSE, u)
     contact.status = SLIPS
-    push = (dilatancy * speed - free) / (1.0 + _SLIP_PER_IMPULSE * mu * dilatancy)
+    push = (dilatancy * speed - free) / slip_response(contact)
     return push, scaled(-mu * push / speed, u)
 
 
@@ -371,7 +380,7 @@ def hold(work: Record, count: int, radius: float, free: Twist) -> Twist:
         contact = work.contact[0]
         push = -excess(contact, free.linear)
         if contact.status == STICKS:
-            drag = scaled(-1.0 / _SLIP_PER_IMPULSE, slip(contact, radius, free))
+            drag = scaled(-1.0 / SLIP_PER_IMPULSE, slip(contact, radius, free))
         else:
             drag = scaled(-contact.friction * push, vector(contact.direction))
         contact.push = push
@@ -434,8 +443,8 @@ def _hold_pair(work: Record, radius: float, free: Twist) -> tuple[bool, Twist]:
 def _impulse_for(n: Vector, change: Vector) -> Vector:
     """Return the impulse that alone changes the velocity of its point of contact so."""
     return plus(
-        scaled(1.0 / _SLIP_PER_IMPULSE, change),
-        _SPIN_PER_IMPULSE / _SLIP_PER_IMPULSE * dot(n, change),
+        scaled(1.0 / SLIP_PER_IMPULSE, change),
+        _SPIN_PER_IMPULSE / SLIP_PER_IMPULSE * dot(n, change),
         n,
     )
 

@@ -6,12 +6,12 @@ import math
 from typing import Final, NamedTuple
 
 from roller_env.physics.rigid.closest import EDGE, FACE
-from roller_env.physics.rigid.coulomb import EXACT, SLIPS, slip, solve
+from roller_env.physics.rigid.coulomb import EXACT, SLIP_PER_IMPULSE, SLIPS, slip, solve
 from roller_env.physics.rigid.impact import (
     CHATTER_M_S,
     LIFTED_M_S,
     STICK_M_S,
-    calmed,
+    solve_jam,
     true_slip,
     velocity_over,
 )
@@ -166,7 +166,7 @@ def choose_motion(
     free = Twist(plus(twist.linear, step, pull), twist.angular)
     after, solved = solve(work, count, radius, free, _ALIKE_IN_STEP)
     if not solved:
-        after = calmed(free, after, radius)
+        after, solved = solve_jam(work, count, radius, free, _ALIKE_IN_STEP)
     rates = Twist(
         scaled(1.0 / step, sub(after.linear, twist.linear)),
         scaled(1.0 / step, sub(after.angular, twist.angular)),
@@ -211,6 +211,7 @@ def lift_off_time(work: Record, solids: Records, count: int, radius: float, rate
         dilatancy = solids[contact.solid].dilatancy
         if contact.status == SLIPS and dilatancy > 0.0:
             most = CHATTER_M_S if count > 1 else LIFTED_M_S
+            most *= 1.0 + SLIP_PER_IMPULSE * contact.friction * dilatancy
             change = dilatancy * norm(slip_change(contact, radius, rates))
             if change > 0.0:
                 time = min(time, 2.0 * most / change)

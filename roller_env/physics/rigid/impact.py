@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from roller_env.physics.rigid.coulomb import EXACT, slip_over, solve
+from roller_env.physics.rigid.coulomb import EXACT, slip_over, slip_response, solve
 from roller_env.physics.rigid.kernels import (
     Record,
     Records,
@@ -82,11 +82,46 @@ def closed_m_s(work: Record, count: int) -> float:
 
 @kernel
 def closing(contact: Record, radius: float, twist: Twist) -> float:
-    """Return how fast a contact closes, or slips without opening as the law asks for, m/s."""
+    """Return how fast a contact closes, or would open if its slip made it, m/s."""
     approach = -opening(contact, twist.linear)
     if contact.dilatancy > 0.0:
-        approach += contact.dilatancy * norm(true_slip(contact, radius, twist))
+        asked = contact.dilatancy * norm(true_slip(contact, radius, twist))
+        approach = max(approach, (asked + approach) / slip_response(contact))
     return approach
+
+
+@kernel
+def _ask_back(contact: Record, radius: float, twist: Twist) -> None:
+    """Write what the restitution asks of the velocities at a contact."""
+    store(contact.surface, (0.0, 0.0, contact.rise))
+    contact.bias, contact.slides = 0.0, 0
+    approach = opening(contact, twist.linear)
+    if approach < -REST_M_S:
+        contact.bias = -contact.elasticity * approach
+        if contact.reversal > 0.0:
+            back = true_slip(contact, radius, twist)
+            store(contact.surface, plus(vector(contact.surface), -contact.reversal, back))
+
+
+@kernel
+def solve_jam(
+    work: Record, count: int, radius: float, free: Twist, alike: float
+) -> tuple[Twist, bool]:
+    """Return what `solve` does of contacts that are asked for no more than not to close.
+
+    Friction can let two contacts press on each other along the line between them however hard
+    (force closure: V.-D. Nguyen, *Constructing force-closure grasps*, 1988). No rigid ball then
+    has velocities by which its two points come apart, as restitution would have it, or as edges
+    that turn do to first order in a step. That they stand still is always an answer.
+    """
+    for i in range(count):
+        contact = work.contact[i]
+        contact.bias = 0.0
+        store(contact.surface, (0.0, 0.0, contact.rise))
+    after, solved = solve(work, count, radius, free, alike)
+    if not solved:
+        after = calmed(free, after, radius)
+    return after, solved
 
 
 @inlined
@@ -97,6 +132,8 @@ def collide(
 
     A moving slab that would have to pass through the ball stands still for the rest of the step:
     what squeezes a rigid ball against something rigid is held up by it.
+
+    Nothing bounces out of a jam: see `solve_jam`.
     """
     approaches, most = False, closed_m_s(work, count)
     for i in range(count):
@@ -106,13 +143,7 @@ def collide(
     fastest, moving = norm(twist.linear) + radius * norm(twist.angular), False
     for i in range(count):
         contact = work.contact[i]
-        store(contact.surface, (0.0, 0.0, contact.rise))
-        contact.slides = 0
-        approach = opening(contact, twist.linear)
-        contact.bias = -contact.elasticity * approach if approach < -REST_M_S else 0.0
-        if contact.reversal > 0.0 and approach < -REST_M_S:
-            back = true_slip(contact, radius, twist)
-            store(contact.surface, plus((0.0, 0.0, contact.rise), -contact.reversal, back))
+        _ask_back(contact, radius, twist)
         moving = moving or contact.rise != 0.0
         fastest = max(fastest, abs(contact.rise))
     after, solved = solve(work, count, radius, twist, EXACT)
@@ -128,7 +159,7 @@ def collide(
             store(contact.surface, (0.0, 0.0, 0.0))
         after, solved = solve(work, count, radius, twist, EXACT)
     if not solved:
-        after = calmed(twist, after, radius)
+        after, solved = solve_jam(work, count, radius, twist, EXACT)
     return after, solved, blocked
 
 

@@ -201,10 +201,10 @@ def _advance_ball(
             listed = min(speed * rest + force * rest * rest, MARGIN_M) + CONTACT_GAP_M
             gather(scenes, level, slabs, work, centre, listed, rest)
         count = touch(solids, slabs, work, radius, ball.position)
-        if count > 0:
-            count, ball = _meet(work, slabs, solids, count, radius, ball)
-        twist = Twist(ball.velocity, ball.spin)
         many = work.segments > MANY_SEGMENTS + 4.0 * duration / cap
+        if count > 0:
+            count, ball = _meet(work, slabs, solids, count, radius, ball, many)
+        twist = Twist(ball.velocity, ball.spin)
         motion = choose_motion(work, count, radius, twist, pull, 0.25 * cap, many)
         if not motion.solved:
             work.unsolved += 1
@@ -277,7 +277,13 @@ def _between(
 
 @inlined
 def _meet(
-    work: Record, slabs: Records, solids: Records, count: int, radius: float, ball: Ball
+    work: Record,
+    slabs: Records,
+    solids: Records,
+    count: int,
+    radius: float,
+    ball: Ball,
+    many: bool,
 ) -> tuple[int, Ball]:
     """Return how many contacts stay closed, and the ball after their impacts.
 
@@ -288,6 +294,8 @@ def _meet(
     for i in range(count):
         contact = work.contact[i]
         p = plus(p, 0.5 * CONTACT_GAP_M - contact.gap, vector(contact.normal))
+        if many:
+            contact.dilatancy = 0.0  # hops are over
     twist = Twist(ball.velocity, ball.spin)
     twist, solved, blocked = collide(work, slabs, solids, count, radius, twist)
     if not solved:

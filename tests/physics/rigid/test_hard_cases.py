@@ -72,6 +72,23 @@ def test_a_gate_that_comes_down_on_the_ball_is_held_up_by_it() -> None:
     assert world.counts.blocked[0] > 0
 
 
+def test_a_ball_that_falls_into_a_wedge_that_jams_does_not_bounce_out_of_it() -> None:
+    """One side is elastic, the other is not, and friction holds the ball between them."""
+    normals = np.array([[0.5614, -0.8043, 0.195], [-0.0152, 0.5835, 0.812]])
+    sides = []
+    for n, elasticity in zip(normals, (0.5, 0.0), strict=True):
+        n /= np.linalg.norm(n)
+        rotation = Rotation.align_vectors([n], [[0.0, 0.0, 1.0]])[0].as_matrix()
+        middle = -(RADIUS_M + 1.0 + 1e-9) * n
+        sides.append(SolidBox(tuple(middle), (9.0, 9.0, 1.0), rotation.tolist(), 0.944, elasticity))
+    world = World(sides).put((0.0, 0.0, 0.0), (1.1, 1.07, -0.75), (-3.2, 3.2, -0.2))
+    before = world.energy()[0]
+    world.run(0.05)
+    assert world.counts.unsolved.sum() == 0
+    assert world.depth().max() < 1e-8
+    assert world.energy()[0] <= before + 1e-9
+
+
 def test_balls_among_many_turned_boxes_stay_outside_and_gain_no_energy() -> None:
     generator = np.random.default_rng(3)
     boxes = [

@@ -77,7 +77,7 @@ def test_a_key_throws_a_light_ball_up_by_the_relaxed_law_alone(
     highest = 0.0
     for _ in range(60):
         world.run(0.05, (5.08, 0.0, 0.0))
-        highest = max(highest, world.states.position[0, 2] - RESTING_M)
+        highest = max(highest, world.way()[:, 2].max() - RESTING_M)
     assert (highest > 1.0) if rises else (abs(highest) < 1e-9)
 
 
@@ -85,8 +85,12 @@ def test_a_key_throws_a_light_ball_up_by_the_relaxed_law_alone(
 def test_a_push_makes_a_ball_hop_where_friction_no_longer_holds_it(push: float) -> None:
     """It rolls up to a push of 7/2 mu m g."""
     force = push * 3.5 * FRICTION * GRAVITY
-    world = World([floor()], law=PLASTIC).put((0.0, 0.0, RESTING_M)).run(1.0, (force, 0.0, 0.0))
-    assert (world.states.position[0, 2] > RESTING_M + 1e-3) == (push > 1.0)
+    world = World([floor()], law=PLASTIC).put((0.0, 0.0, RESTING_M))
+    highest = 0.0
+    for _ in range(20):
+        world.run(0.05, (force, 0.0, 0.0))
+        highest = max(highest, world.way()[:, 2].max() - RESTING_M)
+    assert (highest > 1e-3) if push > 1.0 else (highest < 1e-9)
     assert world.counts.forced.sum() == 0
 
 
