@@ -722,4 +722,5 @@ def _write_slip(
     system[3 * i + 2, 3 * i + 2] += 1.0
     system[3 * i + 1, size] = -r1
     system[3 * i + 2, size] = -r2
-    return max(abs(opening), abs(r1), abs(r2))
+    residual: float = max(abs(opening), abs(r1), abs(r2))
+    return residual
