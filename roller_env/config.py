@@ -47,7 +47,7 @@ class EnvConfig:
         reward_weights: what coins, finish, fall and progress are worth.
         discount: gamma of the shaping; give the same to the training algorithm.
         control_dt_s: time between actions; a multiple of the preset's time step.
-        physics: ``fast``, ``default``, ``accurate`` or a `PhysicsPreset`.
+        physics: ``fast``, ``default``, ``accurate``, ``rigid``, ``relaxed`` or a `PhysicsPreset`.
         max_episode_steps: truncates episodes before the level's own time limit does.
         camera: ``game`` (as the level's triggers say) or a mode 0 to 5 for good.
         render_mode: None or ``rgb_array``.

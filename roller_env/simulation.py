@@ -49,7 +49,7 @@ def make_physics(
         from roller_env.compile.rigid import RigidPhysics
 
         duration_s = substeps * preset.dt_s
-        return RigidPhysics(level, num_envs, substeps, num_threads, duration_s)
+        return RigidPhysics(level, num_envs, substeps, num_threads, duration_s, preset.law)
     from roller_env.compile.compiled import compile_level
     from roller_env.compile.physics import MujocoPhysics
 

@@ -37,7 +37,7 @@ from roller_env.level.template import new_level
 from roller_env.physics.presets import physics_preset
 from roller_env.problems import Problem, printable, shown
 
-Preset = Literal["fast", "default", "accurate", "rigid"]
+Preset = Literal["fast", "default", "accurate", "rigid", "relaxed"]
 """The names of `PRESETS`; a test holds the two together."""
 View = Literal["plan", "overview"]
 Output = Annotated[Path | None, tyro.conf.arg(aliases=["-o"])]

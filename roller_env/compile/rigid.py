@@ -12,7 +12,9 @@ from roller_env.arrays import Bool, Float64, Int64
 from roller_env.compile.merge import merge_solids
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
+from roller_env.physics.presets import FrictionLaw
 from roller_env.physics.protocol import Columns, Path
+from roller_env.physics.rigid.law import COULOMB, LAWS, ContactLaw
 from roller_env.physics.rigid.rays import cast_rays
 from roller_env.physics.rigid.scene import STATIC, RigidLevel, SolidBox, pack
 from roller_env.physics.rigid.states import (
@@ -43,7 +45,7 @@ WORLDS_A_THREAD = 32
 """Fewer are not worth a thread of their own."""
 
 
-def rigid_level(level: Level) -> RigidLevel:
+def rigid_level(level: Level, law: ContactLaw = COULOMB) -> RigidLevel:
     """Return a level as the engine takes it; its slabs are the movers of the expanded level."""
     expanded = expand(level)
 
@@ -68,6 +70,7 @@ def rigid_level(level: Level) -> RigidLevel:
         gravity=level.gravity,
         mass=level.ball.mass_kg,
         slab_stop=[mover.travel for mover in expanded.movers],
+        law=law,
     )
 
 
@@ -75,7 +78,13 @@ class RigidPhysics:
     """N worlds of a level; see `roller_env.physics.protocol.Physics`."""
 
     def __init__(
-        self, level: Level, num_envs: int, substeps: int, num_threads: int, duration_s: float
+        self,
+        level: Level,
+        num_envs: int,
+        substeps: int,
+        num_threads: int,
+        duration_s: float,
+        law: FrictionLaw = "coulomb",
     ):
         """Make the worlds.
 
@@ -85,10 +94,11 @@ class RigidPhysics:
             substeps: parts of a control step between which the path is kept, S.
             num_threads: threads; 0 means one for each CPU.
             duration_s: of a control step.
+            law: of friction and impact.
         """
         self.substeps = substeps
         self._start, self._duration_s = level.start.at, duration_s
-        self._scenes = pack([rigid_level(level)])
+        self._scenes = pack([rigid_level(level, LAWS[law])])
         movers = self._scenes.slab_stop.shape[1]
         self.columns = Columns(
             position=POSITION,

@@ -8,6 +8,7 @@ from typing import Final, Literal, get_args
 from roller_env import checks
 
 Engine = Literal["mujoco", "rigid"]
+FrictionLaw = Literal["coulomb", "relaxed"]
 Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
 Cone = Literal["elliptic", "pyramidal"]
 Solver = Literal["Newton", "PGS", "CG"]
@@ -23,7 +24,7 @@ _LONGEST_NAME: Final = 200
 class PhysicsPreset:
     """One setting of an engine; the level's geometry and materials are not part of it.
 
-    Of ``rigid`` only the name and ``dt_s`` count: how finely the ball's path is kept for the rules.
+    Of the engine ``rigid`` only the name, ``dt_s`` and ``law`` count.
 
     Attributes:
         name: what the ``physics`` option of the environments calls it.
@@ -37,6 +38,8 @@ class PhysicsPreset:
         iterations: most iterations of the solver in a step.
         tolerance: improvement at which the solver stops before that.
         engine: ``mujoco``, or ``rigid``: `roller_env.physics.rigid`.
+        law: of friction and impact in the engine ``rigid``: ``coulomb``, or ``relaxed``, which is
+            MuJoCo's; see `roller_env.physics.rigid.law`.
 
     Raises:
         ValueError: a value is not allowed; the message says what is.
@@ -51,6 +54,7 @@ class PhysicsPreset:
     iterations: int = 20
     tolerance: float = 1e-8
     engine: Engine = "mujoco"
+    law: FrictionLaw = "coulomb"
 
     def __post_init__(self) -> None:
         """Refuse what MuJoCo cannot compute with, or not in any reasonable time."""
@@ -61,6 +65,7 @@ class PhysicsPreset:
                 "name": lambda: _name(self.name),
                 "dt_s": lambda: number("physics.dt_s", self.dt_s, MIN_DT_S, 1.0, seconds),
                 "engine": lambda: one_of("physics.engine", self.engine, get_args(Engine)),
+                "law": lambda: one_of("physics.law", self.law, get_args(FrictionLaw)),
                 "integrator": lambda: one_of(
                     "physics.integrator", self.integrator, get_args(Integrator)
                 ),
@@ -117,6 +122,11 @@ second."""
 RIGID: Final = PhysicsPreset("rigid", dt_s=1 / 240, engine="rigid")
 """The rigid-ball engine: exact impacts and rolling, no softness, many times cheaper."""
 
+RELAXED: Final = PhysicsPreset("relaxed", dt_s=1 / 240, engine="rigid", law="relaxed")
+"""The rigid-ball engine with MuJoCo's law of friction: what ``default`` would be without softness.
+
+A ball that slips lifts off the ground, as it does in MuJoCo."""
+
 MUJOCO_PRESETS: Final[dict[str, PhysicsPreset]] = {
     preset.name: preset for preset in (FAST, DEFAULT, ACCURATE)
 }
@@ -124,7 +134,10 @@ MUJOCO_PRESETS: Final[dict[str, PhysicsPreset]] = {
 docs/presets.md."""
 
 
-PRESETS: Final[dict[str, PhysicsPreset]] = {**MUJOCO_PRESETS, RIGID.name: RIGID}
+PRESETS: Final[dict[str, PhysicsPreset]] = {
+    **MUJOCO_PRESETS,
+    **{preset.name: preset for preset in (RIGID, RELAXED)},
+}
 """All that the option ``physics`` knows by name."""
 
 

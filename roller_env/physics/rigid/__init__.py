@@ -15,6 +15,7 @@ engine goes from event to event:
 - `impact` and `holding`: what they do at an impact, and to a ball that is held;
 - `motion`: skids, edges and corners; `sliding`: a skid that turns, in closed form;
 - `rays`: how far it is from a ball to the first solid;
+- `law`: Coulomb's friction with Newton's restitution, or MuJoCo's relaxation of both;
 - `linear`: small systems of equations; `kernels`: vectors, and how functions are compiled;
 - `attitude`: the quaternion of a ball whose angular velocity changes linearly.
 """

@@ -49,11 +49,13 @@ from roller_env.physics.rigid.linear import eliminate
 
 EXACT: Final = 1e-9
 
+SLIP_PER_IMPULSE: Final = 3.5
+"""By how much a unit of drag changes the slip of its own contact: 1 + 5/2."""
+
 OPEN: Final = 0
 STICKS: Final = 1
 SLIPS: Final = 2
 
-_SLIP_PER_IMPULSE: Final = 3.5
 _SPIN_PER_IMPULSE: Final = 2.5
 _FIRST_SWEEPS: Final = 8
 _MOST_ATTEMPTS: Final = 8
@@ -84,6 +86,15 @@ def excess(contact: Record, v: Vector) -> float:
     opening = dot(vector(contact.normal), sub(v, vector(contact.surface)))
     excess: float = opening - contact.bias
     return excess
+
+
+@kernel
+def lag(contact: Record, radius: float, twist: Twist) -> float:
+    """Return `excess`, less what the slip of a contact with dilatancy asks for besides."""
+    value: float = excess(contact, twist.linear)
+    if contact.dilatancy > 0.0 and not contact.slides:
+        value -= contact.dilatancy * norm(slip(contact, radius, twist))
+    return value
 
 
 @kernel
@@ -149,7 +160,7 @@ def _enumerate(
     for _ in range(count):
         twist = _hold_known(work, count, radius, free)
         kept = _kept(work, count, radius, twist, scale)
-        if kept and _satisfied(work, count, twist.linear, scale):
+        if kept and _satisfied(work, count, radius, twist, scale):
             return True, twist
         most, pulls = 0.0, -1
         for i in range(count):
@@ -210,11 +221,13 @@ def _sweep(work: Record, count: int, radius: float, twist: Twist) -> tuple[Twist
         push = max(contact.push - excess(contact, twist.linear), 0.0)
         old = vector(contact.drag)
         most = contact.friction * push
-        if contact.slides:
+        if contact.dilatancy > 0.0 and not contact.slides:
+            push, drag = _alone(contact, radius, twist)
+        elif contact.slides:
             drag = scaled(-most, vector(contact.direction))
             contact.status = SLIPS
         else:
-            drag = plus(old, -1.0 / _SLIP_PER_IMPULSE, slip(contact, radius, twist))
+            drag = plus(old, -1.0 / SLIP_PER_IMPULSE, slip(contact, radius, twist))
             size = norm(drag)
             contact.status = STICKS
             if size > most:
@@ -228,6 +241,36 @@ def _sweep(work: Record, count: int, radius: float, twist: Twist) -> tuple[Twist
         contact.push = push
         store(contact.drag, drag)
     return twist, change
+
+
+@kernel
+def slip_response(contact: Record) -> float:
+    """Return by how much a unit of push changes ``w - d |u|`` where it slips; see `_alone`."""
+    response: float = 1.0 + SLIP_PER_IMPULSE * contact.friction * contact.dilatancy
+    return response
+
+
+@kernel
+def _alone(contact: Record, radius: float, twist: Twist) -> tuple[float, Vector]:
+    """Return push and drag of a contact whose slip makes it open, given the others; its status.
+
+    Without it the normal velocity exceeds what is asked for by w and the slip is u. It does nothing
+    if w >= d u, d being the dilatancy; it sticks if that is within the cone; and otherwise
+    w + N = d (u - 7/2 mu N).
+    """
+    old, mu, dilatancy = vector(contact.drag), contact.friction, contact.dilatancy
+    free = excess(contact, twist.linear) - contact.push
+    u = plus(slip(contact, radius, twist), -SLIP_PER_IMPULSE, old)
+    speed = norm(u)
+    contact.status = OPEN
+    if free >= dilatancy * speed:
+        return 0.0, (0.0, 0.0, 0.0)
+    contact.status = STICKS
+    if speed <= -SLIP_PER_IMPULSE * mu * free:
+        return -free, scaled(-1.0 / SLIP_PER_IMPULSE, u)
+    contact.status = SLIPS
+    push = (dilatancy * speed - free) / slip_response(contact)
+    return push, scaled(-mu * push / speed, u)
 
 
 @kernel
@@ -337,7 +380,7 @@ def hold(work: Record, count: int, radius: float, free: Twist) -> Twist:
         contact = work.contact[0]
         push = -excess(contact, free.linear)
         if contact.status == STICKS:
-            drag = scaled(-1.0 / _SLIP_PER_IMPULSE, slip(contact, radius, free))
+            drag = scaled(-1.0 / SLIP_PER_IMPULSE, slip(contact, radius, free))
         else:
             drag = scaled(-contact.friction * push, vector(contact.direction))
         contact.push = push
@@ -400,8 +443,8 @@ def _hold_pair(work: Record, radius: float, free: Twist) -> tuple[bool, Twist]:
 def _impulse_for(n: Vector, change: Vector) -> Vector:
     """Return the impulse that alone changes the velocity of its point of contact so."""
     return plus(
-        scaled(1.0 / _SLIP_PER_IMPULSE, change),
-        _SPIN_PER_IMPULSE / _SLIP_PER_IMPULSE * dot(n, change),
+        scaled(1.0 / SLIP_PER_IMPULSE, change),
+        _SPIN_PER_IMPULSE / SLIP_PER_IMPULSE * dot(n, change),
         n,
     )
 
@@ -512,7 +555,7 @@ def _polish(
             break
         before = residual
     twist = _sum(work, count, radius, free)
-    if done and _satisfied(work, count, twist.linear, scale):
+    if done and _satisfied(work, count, radius, twist, scale):
         return True, twist
     for i in range(count):
         contact = work.contact[i]
@@ -527,7 +570,7 @@ def _kept(work: Record, count: int, radius: float, twist: Twist, scale: float) -
     room = 1e-12 * scale
     for i in range(count):
         contact = work.contact[i]
-        if contact.status != OPEN and abs(excess(contact, twist.linear)) > room:
+        if contact.status != OPEN and abs(lag(contact, radius, twist)) > room:
             return False
         if contact.status == STICKS and norm(slip(contact, radius, twist)) > room:
             return False
@@ -535,14 +578,14 @@ def _kept(work: Record, count: int, radius: float, twist: Twist, scale: float) -
 
 
 @kernel
-def _satisfied(work: Record, count: int, v: Vector, scale: float) -> bool:
+def _satisfied(work: Record, count: int, radius: float, twist: Twist, scale: float) -> bool:
     """Say whether no contact pulls, closes or sticks beyond its cone."""
     room = 1e-12 * scale
     for i in range(count):
         contact = work.contact[i]
         if contact.push < -room:
             return False
-        if contact.status == OPEN and excess(contact, v) < -room:
+        if contact.status == OPEN and lag(contact, radius, twist) < -room:
             return False
         most = contact.friction * max(contact.push, 0.0)
         if contact.status == STICKS and norm(vector(contact.drag)) > most + room:
@@ -609,55 +652,75 @@ def _newton_step(work: Record, m: int, radius: float, free: Twist) -> float:
         twist = _apply(contact, radius, twist, contact.push, vector(contact.drag))
     size = 3 * m
     residual = 0.0
-    system, response = work.system, work.response
     for i in range(m):
         contact = work.contact[work.active[i]]
         first, second = row(work.frame, 3 * i + 1), row(work.frame, 3 * i + 2)
         u = slip(contact, radius, twist)
         u1, u2 = dot(u, first), dot(u, second)
         opening = excess(contact, twist.linear)
-        residual = max(residual, abs(opening))
-        for k in range(size):
-            system[3 * i, k] = response[3 * i, k]
-        system[3 * i, size] = -opening
         if contact.status == STICKS:
-            residual = max(residual, abs(u1), abs(u2))
-            for k in range(size):
-                system[3 * i + 1, k] = response[3 * i + 1, k]
-                system[3 * i + 2, k] = response[3 * i + 2, k]
-            system[3 * i + 1, size] = -u1
-            system[3 * i + 2, size] = -u2
-            continue
-        mu, push, drag = contact.friction, contact.push, vector(contact.drag)
-        speed = _length(u1, u2)
-        stiffness = 0.0
-        if contact.slides:
-            d = vector(contact.direction)
-            d1, d2 = dot(d, first), dot(d, second)
-        elif speed > 0.0:
-            d1, d2 = u1 / speed, u2 / speed
-            stiffness = mu * push / speed
+            for a in range(3):
+                for k in range(size):
+                    work.system[3 * i + a, k] = work.response[3 * i + a, k]
+            work.system[3 * i, size] = -opening
+            work.system[3 * i + 1, size] = -u1
+            work.system[3 * i + 2, size] = -u2
+            residual = max(residual, abs(opening), abs(u1), abs(u2))
         else:
-            d1 = d2 = 0.0
-        r1, r2 = dot(drag, first) + mu * push * d1, dot(drag, second) + mu * push * d2
-        residual = max(residual, abs(r1), abs(r2))
-        # T + mu N u/|u| = 0, and its derivative by way of u.
-        for k in range(size):
-            g1, g2 = response[3 * i + 1, k], response[3 * i + 2, k]
-            across = stiffness * (d1 * g2 - d2 * g1)
-            system[3 * i + 1, k] = -across * d2
-            system[3 * i + 2, k] = across * d1
-        system[3 * i + 1, 3 * i] += mu * d1
-        system[3 * i + 2, 3 * i] += mu * d2
-        system[3 * i + 1, 3 * i + 1] += 1.0
-        system[3 * i + 2, 3 * i + 2] += 1.0
-        system[3 * i + 1, size] = -r1
-        system[3 * i + 2, size] = -r2
-    eliminate(system, size, work.columns)
+            residual = max(residual, _write_slip(work, i, size, contact, u1, u2, opening))
+    eliminate(work.system, size, work.columns)
     for i in range(m):
         contact = work.contact[work.active[i]]
-        contact.push += system[3 * i, size]
+        contact.push += work.system[3 * i, size]
         drag = vector(contact.drag)
-        drag = plus(drag, system[3 * i + 1, size], row(work.frame, 3 * i + 1))
-        store(contact.drag, plus(drag, system[3 * i + 2, size], row(work.frame, 3 * i + 2)))
+        drag = plus(drag, work.system[3 * i + 1, size], row(work.frame, 3 * i + 1))
+        store(contact.drag, plus(drag, work.system[3 * i + 2, size], row(work.frame, 3 * i + 2)))
+    return residual
+
+
+@kernel
+def _write_slip(
+    work: Record, i: int, size: int, contact: Record, u1: float, u2: float, opening: float
+) -> float:
+    """Write the rows of the ``i``-th active contact, which slips; return their residual.
+
+    They are w - d |u| = 0, where w is the `excess` and d the dilatancy, and T + mu N u/|u| = 0.
+    """
+    system, response = work.system, work.response
+    first, second = row(work.frame, 3 * i + 1), row(work.frame, 3 * i + 2)
+    mu, push, drag = contact.friction, contact.push, vector(contact.drag)
+    speed = _length(u1, u2)
+    stiffness = dilatancy = 0.0
+    if contact.slides:
+        d = vector(contact.direction)
+        d1, d2 = dot(d, first), dot(d, second)
+    elif speed > 0.0:
+        d1, d2 = u1 / speed, u2 / speed
+        stiffness = mu * push / speed
+        dilatancy = contact.dilatancy
+    else:
+        d1 = d2 = 0.0
+    for k in range(size):
+        system[3 * i, k] = response[3 * i, k]
+    system[3 * i, size] = -opening
+    if dilatancy > 0.0:
+        opening -= dilatancy * speed
+        system[3 * i, size] = -opening
+        for k in range(size):
+            along = d1 * response[3 * i + 1, k] + d2 * response[3 * i + 2, k]
+            system[3 * i, k] -= dilatancy * along
+    r1, r2 = dot(drag, first) + mu * push * d1, dot(drag, second) + mu * push * d2
+    # The derivative of the direction by way of u.
+    for k in range(size):
+        g1, g2 = response[3 * i + 1, k], response[3 * i + 2, k]
+        across = stiffness * (d1 * g2 - d2 * g1)
+        system[3 * i + 1, k] = -across * d2
+        system[3 * i + 2, k] = across * d1
+    system[3 * i + 1, 3 * i] += mu * d1
+    system[3 * i + 2, 3 * i] += mu * d2
+    system[3 * i + 1, 3 * i + 1] += 1.0
+    system[3 * i + 2, 3 * i + 2] += 1.0
+    system[3 * i + 1, size] = -r1
+    system[3 * i + 2, size] = -r2
+    residual: float = max(abs(opening), abs(r1), abs(r2))
     return residual

@@ -6,11 +6,19 @@ import math
 from typing import Final, NamedTuple
 
 from roller_env.physics.rigid.closest import EDGE, FACE
-from roller_env.physics.rigid.coulomb import EXACT, SLIPS, slip, solve
-from roller_env.physics.rigid.impact import STICK_M_S, calmed, true_slip, velocity_over
+from roller_env.physics.rigid.coulomb import EXACT, SLIP_PER_IMPULSE, SLIPS, slip, solve
+from roller_env.physics.rigid.impact import (
+    CHATTER_M_S,
+    LIFTED_M_S,
+    STICK_M_S,
+    solve_jam,
+    true_slip,
+    velocity_over,
+)
 from roller_env.physics.rigid.kernels import (
     Ball,
     Record,
+    Records,
     Twist,
     Vector,
     cross,
@@ -134,6 +142,8 @@ def choose_motion(
         u = true_slip(contact, radius, twist)
         size = norm(u)
         contact.slides = 0
+        # A slip that is to lift the ball off has done so: what is held is slower (`lift_off_time`).
+        contact.dilatancy = 0.0
         if size > STICK_M_S:
             contact.slides = 1
             store(contact.direction, scaled(1.0 / size, u))
@@ -156,7 +166,7 @@ def choose_motion(
     free = Twist(plus(twist.linear, step, pull), twist.angular)
     after, solved = solve(work, count, radius, free, _ALIKE_IN_STEP)
     if not solved:
-        after = calmed(free, after, radius)
+        after, solved = solve_jam(work, count, radius, free, _ALIKE_IN_STEP)
     rates = Twist(
         scaled(1.0 / step, sub(after.linear, twist.linear)),
         scaled(1.0 / step, sub(after.angular, twist.angular)),
@@ -189,6 +199,22 @@ def slip_time(work: Record, count: int, radius: float, twist: Twist, rates: Twis
             fastest = max(-along, norm(plus(change, -along, d)))
             if fastest > 0.0:
                 time = min(time, norm(true_slip(contact, radius, twist)) / fastest)
+    return time
+
+
+@kernel
+def lift_off_time(work: Record, solids: Records, count: int, radius: float, rates: Twist) -> float:
+    """Return in what time a slip grows to one that lifts the ball off, or ``inf``."""
+    time = math.inf
+    for i in range(count):
+        contact = work.contact[i]
+        dilatancy = solids[contact.solid].dilatancy
+        if contact.status == SLIPS and dilatancy > 0.0:
+            most = CHATTER_M_S if count > 1 else LIFTED_M_S
+            most *= 1.0 + SLIP_PER_IMPULSE * contact.friction * dilatancy
+            change = dilatancy * norm(slip_change(contact, radius, rates))
+            if change > 0.0:
+                time = min(time, 2.0 * most / change)
     return time
 
 

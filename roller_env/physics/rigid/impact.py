@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from roller_env.physics.rigid.coulomb import EXACT, slip_over, solve
+from roller_env.physics.rigid.coulomb import EXACT, slip_over, slip_response, solve
 from roller_env.physics.rigid.kernels import (
     Record,
     Records,
@@ -29,6 +29,10 @@ CLOSED_M_S: Final = 1e-6
 CHATTER_M_S: Final = 1e-3
 """The same where several contacts touch. Friction at one lifts the ball off another, and a ball
 that comes to rest in a corner would do so through ever smaller hops without end."""
+
+LIFTED_M_S: Final = 1e-4
+"""The same of one contact whose slip makes it open: what opens more slowly falls back before it has
+risen by a contact's gap (v^2 / 2g), so that such a slip is Coulomb's."""
 
 REST_M_S: Final = 1e-3
 """An impact slower than this is plastic, whatever the elasticity: the bounces end."""
@@ -69,9 +73,55 @@ def calmed(before: Twist, after: Twist, radius: float) -> Twist:
 
 
 @kernel
-def closed_m_s(count: int) -> float:
-    """Return the normal velocity below which one of ``count`` contacts is held."""
-    return CLOSED_M_S if count == 1 else CHATTER_M_S
+def closed_m_s(work: Record, count: int) -> float:
+    """Return the normal velocity below which ``count`` contacts are held."""
+    if count > 1:
+        return CHATTER_M_S
+    return CLOSED_M_S if work.contact[0].dilatancy == 0.0 else LIFTED_M_S
+
+
+@kernel
+def closing(contact: Record, radius: float, twist: Twist) -> float:
+    """Return how fast a contact closes, or would open if its slip made it, m/s."""
+    approach = -opening(contact, twist.linear)
+    if contact.dilatancy > 0.0:
+        asked = contact.dilatancy * norm(true_slip(contact, radius, twist))
+        approach = max(approach, (asked + approach) / slip_response(contact))
+    return approach
+
+
+@kernel
+def _ask_back(contact: Record, radius: float, twist: Twist) -> None:
+    """Write what the restitution asks of the velocities at a contact."""
+    store(contact.surface, (0.0, 0.0, contact.rise))
+    contact.bias, contact.slides = 0.0, 0
+    approach = opening(contact, twist.linear)
+    if approach < -REST_M_S:
+        contact.bias = -contact.elasticity * approach
+        if contact.reversal > 0.0:
+            back = true_slip(contact, radius, twist)
+            store(contact.surface, plus(vector(contact.surface), -contact.reversal, back))
+
+
+@kernel
+def solve_jam(
+    work: Record, count: int, radius: float, free: Twist, alike: float
+) -> tuple[Twist, bool]:
+    """Return what `solve` does of contacts that are asked for no more than not to close.
+
+    Friction can let two contacts press on each other along the line between them however hard
+    (force closure: V.-D. Nguyen, *Constructing force-closure grasps*, 1988). No rigid ball then
+    has velocities by which its two points come apart, as restitution would have it, or as edges
+    that turn do to first order in a step. That they stand still is always an answer.
+    """
+    for i in range(count):
+        contact = work.contact[i]
+        contact.bias = 0.0
+        store(contact.surface, (0.0, 0.0, contact.rise))
+    after, solved = solve(work, count, radius, free, alike)
+    if not solved:
+        after = calmed(free, after, radius)
+    return after, solved
 
 
 @inlined
@@ -82,19 +132,18 @@ def collide(
 
     A moving slab that would have to pass through the ball stands still for the rest of the step:
     what squeezes a rigid ball against something rigid is held up by it.
+
+    Nothing bounces out of a jam: see `solve_jam`.
     """
-    approaches = False
+    approaches, most = False, closed_m_s(work, count)
     for i in range(count):
-        approaches = approaches or opening(work.contact[i], twist.linear) < -closed_m_s(count)
+        approaches = approaches or closing(work.contact[i], radius, twist) > most
     if not approaches:
         return twist, True, 0
     fastest, moving = norm(twist.linear) + radius * norm(twist.angular), False
     for i in range(count):
         contact = work.contact[i]
-        store(contact.surface, (0.0, 0.0, contact.rise))
-        contact.slides = 0
-        approach = opening(contact, twist.linear)
-        contact.bias = -contact.elasticity * approach if approach < -REST_M_S else 0.0
+        _ask_back(contact, radius, twist)
         moving = moving or contact.rise != 0.0
         fastest = max(fastest, abs(contact.rise))
     after, solved = solve(work, count, radius, twist, EXACT)
@@ -110,14 +159,14 @@ def collide(
             store(contact.surface, (0.0, 0.0, 0.0))
         after, solved = solve(work, count, radius, twist, EXACT)
     if not solved:
-        after = calmed(twist, after, radius)
+        after, solved = solve_jam(work, count, radius, twist, EXACT)
     return after, solved, blocked
 
 
 @inlined
 def keep_closed(work: Record, count: int, v: Vector) -> int:
     """Leave out contacts that open; return how many are left."""
-    fastest = closed_m_s(count)
+    fastest = closed_m_s(work, count)
     i = none_of(count)
     while i < count:
         if opening(work.contact[i], v) > fastest:

@@ -47,12 +47,19 @@ _STILL: Final = (0.0, 0.0, 0.0)
 
 @kernel
 def arc_end(work: Record, count: int, radius: float, v: Vector) -> float:
-    """Return the time in which the ball rounds an edge or a corner by `LONGEST_ARC`, or ``inf``."""
+    """Return the time in which the ball rounds an edge or a corner by `LONGEST_ARC`, or ``inf``.
+
+    It is less where friction is high and the ball slips: the normal force gives way with the square
+    of the velocity, v^2 / r, and by way of mu N the slip does at the rate 2 mu v / r.
+    """
     fastest = 0.0
     for i in range(count):
         contact = work.contact[i]
         if contact.kind != FACE:
-            fastest = max(fastest, norm(across(contact, velocity_over(contact, v))))
+            speed = norm(across(contact, velocity_over(contact, v)))
+            if contact.status == SLIPS:
+                speed *= max(1.0, 2.0 * contact.friction)
+            fastest = max(fastest, speed)
     return LONGEST_ARC * radius / fastest if fastest > 0.0 else math.inf
 
 

@@ -123,7 +123,8 @@ def touch(solids: Records, slabs: Records, work: Record, radius: float, position
                 store(contact.pivot, plus(position, -distance, normal))
                 if kind == EDGE:
                     store(contact.edge, row(solid.axes, axis))
-            contact.friction, contact.elasticity = solid.friction, solid.elasticity
+            contact.friction, contact.dilatancy = solid.friction, solid.dilatancy
+            contact.elasticity, contact.reversal = solid.elasticity, solid.reversal
             count += 1
     return count
 
@@ -141,13 +142,14 @@ def weld(work: Record, count: int, radius: float) -> int:
         inner = False
         for j in range(count):
             b = work.contact[j]
-            if i == j or a.rise != b.rise:
+            # Planes that move along themselves stay what they are to what lies in them.
+            if i == j or b.normal[2] * (a.rise - b.rise) != 0.0:
                 continue
             cosine = dot(vector(a.normal), vector(b.normal))
             if b.kind == FACE and a.kind != FACE:
                 over = (radius + b.gap) - (radius + a.gap) * cosine
                 inner = inner or abs(over) < WELD_M
-            elif a.kind == b.kind and cosine > 1.0 - 1e-12:
+            elif a.rise == b.rise and a.kind == b.kind and cosine > 1.0 - 1e-12:
                 inner = inner or a.gap > b.gap or (a.gap == b.gap and j < i)
         if inner:
             count -= 1

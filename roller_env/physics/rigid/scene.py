@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from roller_env.arrays import Float64, Int64
 from roller_env.physics.rigid.kernels import Records
+from roller_env.physics.rigid.law import COULOMB, ContactLaw
 
 Int32 = npt.NDArray[np.int32]
 
@@ -41,7 +42,9 @@ SOLID: Final = np.dtype(
         ("low", np.float64, 3),  # bounding box, of a slab before it moves
         ("high", np.float64, 3),
         ("friction", np.float64),
-        ("elasticity", np.float64),
+        ("elasticity", np.float64),  # coefficient of restitution, as the law has it
+        ("reversal", np.float64),  # tangential restitution
+        ("dilatancy", np.float64),  # v_n / |u| where the ball slips on it
         ("slab", np.int64),  # which slab of its level it is, or `STATIC`
         ("aligned", np.int64),  # 1 if its axes are the world's
     ],
@@ -95,6 +98,7 @@ class RigidLevel:
         radius: of the ball, metres.
         gravity: m/s^2, downwards.
         mass: of the ball, kg.
+        law: of all its contacts.
         slab_stop: (P,) the displacement, metres, <= 0, at which each slab is down. It stands
             between there and 0, where it is before it moves.
     """
@@ -104,6 +108,7 @@ class RigidLevel:
     gravity: float
     mass: float = 1.0
     slab_stop: Sequence[float] = ()
+    law: ContactLaw = COULOMB
 
 
 class Scenes(NamedTuple):
@@ -177,7 +182,9 @@ def _solids(level: RigidLevel, number: int) -> Records:
     solid["axes"] = rotation.transpose(0, 2, 1)
     solid["low"], solid["high"] = centre - extent, centre + extent
     solid["friction"] = [box.friction for box in boxes]
-    solid["elasticity"] = [box.elasticity for box in boxes]
+    solid["elasticity"] = [level.law.restitution(box.elasticity) for box in boxes]
+    solid["reversal"] = [level.law.tangential_restitution(box.elasticity) for box in boxes]
+    solid["dilatancy"] = level.law.dilatancy * solid["friction"]
     solid["slab"] = slab
     solid["aligned"] = (rotation == np.eye(3)).all(axis=(1, 2))
     return solid

@@ -29,6 +29,7 @@ from roller_env.physics.rigid.holding import (
     Motion,
     choose_motion,
     end_slip,
+    lift_off_time,
     slip_time,
     slips_end,
 )
@@ -86,7 +87,7 @@ FORCED_STEP_S: Final = 1e-3
 MANY_SEGMENTS: Final = 32
 """In one control step, besides 4 for each time of the cap; beyond it contacts change faster than is
 worth following (a ball that spins in a corner chatters against its walls), and several at once are
-stepped over."""
+stepped over. Beyond twice as many a slip lifts nothing off any more in this step."""
 
 SHORTEST_S: Final = 1e-13
 
@@ -200,13 +201,16 @@ def _advance_ball(
             listed = min(speed * rest + force * rest * rest, MARGIN_M) + CONTACT_GAP_M
             gather(scenes, level, slabs, work, centre, listed, rest)
         count = touch(solids, slabs, work, radius, ball.position)
-        if count > 0:
-            count, ball = _meet(work, slabs, solids, count, radius, ball)
-        twist = Twist(ball.velocity, ball.spin)
         many = work.segments > MANY_SEGMENTS + 4.0 * duration / cap
+        hops = work.segments < 2.0 * (MANY_SEGMENTS + 4.0 * duration / cap)
+        if count > 0:
+            count, ball = _meet(work, slabs, solids, count, radius, ball, hops)
+        twist = Twist(ball.velocity, ball.spin)
         motion = choose_motion(work, count, radius, twist, pull, 0.25 * cap, many)
         if not motion.solved:
             work.unsolved += 1
+        if hops:
+            left = min(left, lift_off_time(work, solids, motion.holding, radius, motion.rates))
         course = _plan(work, solids, motion, radius, ball, pull, way, left, cap)
         course = _until(work, solids, motion, radius, ball, pull, way, course)
         if work.segments > MOST_SEGMENTS + 8.0 * duration / cap:
@@ -276,17 +280,26 @@ def _between(
 
 @inlined
 def _meet(
-    work: Record, slabs: Records, solids: Records, count: int, radius: float, ball: Ball
+    work: Record,
+    slabs: Records,
+    solids: Records,
+    count: int,
+    radius: float,
+    ball: Ball,
+    hops: bool,
 ) -> tuple[int, Ball]:
     """Return how many contacts stay closed, and the ball after their impacts.
 
-    It is moved by less than a contact's gap, to half of that away from each contact.
+    It is moved by less than a contact's gap, to half of that away from each contact. Without
+    ``hops`` what slips stays on the ground by any law.
     """
     count = weld(work, count, radius)
     p = ball.position
     for i in range(count):
         contact = work.contact[i]
         p = plus(p, 0.5 * CONTACT_GAP_M - contact.gap, vector(contact.normal))
+        if not hops:
+            contact.dilatancy = 0.0
     twist = Twist(ball.velocity, ball.spin)
     twist, solved, blocked = collide(work, slabs, solids, count, radius, twist)
     if not solved:

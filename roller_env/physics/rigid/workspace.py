@@ -22,6 +22,8 @@ CONTACT: Final = np.dtype(
         ("edge", np.float64, 3),  # direction of the edge that is touched
         ("friction", np.float64),
         ("elasticity", np.float64),
+        ("reversal", np.float64),
+        ("dilatancy", np.float64),
         ("shift", np.float64),  # displacement of the solid along z
         ("rise", np.float64),  # velocity of the solid along z
         # The problem of impulses or forces:

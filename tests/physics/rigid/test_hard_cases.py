@@ -72,6 +72,37 @@ def test_a_gate_that_comes_down_on_the_ball_is_held_up_by_it() -> None:
     assert world.counts.blocked[0] > 0
 
 
+@pytest.mark.parametrize("beside", [0.0, 5e-6, 1.2e-5])
+def test_a_ball_hits_a_wall_and_a_gate_that_sinks_in_its_plane_as_one(beside: float) -> None:
+    """It touches the gate's face and the wall's edge, whose normals are next to the same."""
+    wall = SolidBox((1.0 + RADIUS_M, -5.0, 2.0), (1.0, 5.0, 5.0))
+    gate = SolidBox((1.0 + RADIUS_M, 5.0, 2.0), (1.0, 5.0, 5.0), slab=0)
+    world = World([floor(), wall, gate], slab_stop=[-4.0])
+    world.put((-0.5e-9, beside, RESTING_M), (0.983, 0.079, 0.0), (-0.196, 2.42, -0.45))
+    world.states.slab_velocity[:] = -0.8
+    world.run(0.05, (5.08, -5.08, 0.0))
+    assert world.states.slab[0, 0] == pytest.approx(-0.04, abs=1e-12)
+    assert world.states.velocity[0, 0] == pytest.approx(0.0, abs=1e-12)
+    assert world.counts.unsolved.sum() == world.counts.blocked.sum() == 0
+
+
+def test_a_ball_that_falls_into_a_wedge_that_jams_does_not_bounce_out_of_it() -> None:
+    """One side is elastic, the other is not, and friction holds the ball between them."""
+    normals = np.array([[0.5614, -0.8043, 0.195], [-0.0152, 0.5835, 0.812]])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    sides = []
+    for n, elasticity in zip(normals, (0.5, 0.0), strict=True):
+        rotation = Rotation.align_vectors([n], [[0.0, 0.0, 1.0]])[0].as_matrix()
+        middle = -(RADIUS_M + 1.0 + 1e-9) * n
+        sides.append(SolidBox(tuple(middle), (9.0, 9.0, 1.0), rotation.tolist(), 0.944, elasticity))
+    world = World(sides).put((0.0, 0.0, 0.0), (1.1, 1.07, -0.75), (-3.2, 3.2, -0.2))
+    before = world.energy()[0]
+    world.run(0.05)
+    assert world.counts.unsolved.sum() == 0
+    assert world.depth().max() < 1e-8
+    assert world.energy()[0] <= before + 1e-9
+
+
 def test_balls_among_many_turned_boxes_stay_outside_and_gain_no_energy() -> None:
     generator = np.random.default_rng(3)
     boxes = [

@@ -116,6 +116,8 @@ FINE_S = 1 / 960
     ("velocity", "friction", "duration", "phases"),
     [
         ((0.5, 0.0, 0.0), 0.3, 0.5, ["rolls", "slips", "flies"]),
+        ((0.5, 0.0, 0.0), 2.0, 0.5, ["rolls", "slips", "flies"]),
+        ((0.5, 0.0, 0.0), 5.0, 0.5, ["rolls", "slips", "flies"]),
         ((0.4, 0.7, 0.0), 0.3, 0.35, ["rolls"]),
         ((0.2, -1.5, 0.0), 0.8, 0.4, ["rolls"]),
     ],

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from roller_env.physics.rigid.law import COULOMB, ContactLaw
 from roller_env.physics.rigid.scene import RigidLevel, Scenes, SolidBox, pack
 from roller_env.physics.rigid.states import States, make_counts, make_states
 from roller_env.physics.rigid.step import advance
@@ -42,7 +43,7 @@ def slope(degrees: float) -> SolidBox:
 
 
 class World:
-    """N balls of 1 kg in one scene, at rest at the origin until they are put somewhere.
+    """N balls, of 1 kg unless said, in one scene, at rest at the origin until they are put.
 
     Attributes:
         scenes: what they meet.
@@ -59,8 +60,10 @@ class World:
         *,
         slab_stop: Sequence[float] = (),
         cap_s: float = CAP_S,
+        law: ContactLaw = COULOMB,
+        mass_kg: float = 1.0,
     ):
-        level = RigidLevel(boxes, RADIUS_M, GRAVITY, slab_stop=slab_stop)
+        level = RigidLevel(boxes, RADIUS_M, GRAVITY, mass=mass_kg, slab_stop=slab_stop, law=law)
         self.scenes: Scenes = pack([level])
         self.states = make_states(self.scenes, count)
         self.counts = make_counts(count)

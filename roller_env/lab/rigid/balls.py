@@ -1,0 +1,75 @@
+"""N balls of the rigid engine in one scene, with nothing of the game around them."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from roller_env.arrays import Float64
+from roller_env.physics.rigid.scene import RigidLevel, pack
+from roller_env.physics.rigid.states import Counts, make_counts, make_states
+from roller_env.physics.rigid.step import advance
+from roller_env.physics.rigid.workspace import make_workspace
+
+STEP_S: Final = 1 / 20
+"""A control step."""
+
+_KNOTS: Final = 400
+
+
+class Balls:
+    """N balls in one scene, at rest at the origin until they are put somewhere.
+
+    Attributes:
+        level: the scene.
+        states: where they are, and what is done to them.
+        counts: what the steps took.
+    """
+
+    def __init__(self, level: RigidLevel, count: int, cap_s: float = 1 / 120) -> None:
+        """Make them; ``cap_s`` is the longest step of what has no closed form."""
+        self.level, self._cap_s = level, cap_s
+        self._scenes = pack([level])
+        self.states = make_states(self._scenes, count)
+        self.counts: Counts = make_counts(count)
+        self._workspace = make_workspace(self._scenes)
+        self._levels, self._rows = np.zeros(count, dtype=np.int64), np.arange(count)
+        self._path, self._knots = np.zeros((count, _KNOTS, 6)), np.zeros(count, dtype=np.int64)
+
+    def step(self) -> None:
+        """Let a control step pass."""
+        advance(
+            self._scenes,
+            self._levels,
+            self.states.packed,
+            self._rows,
+            STEP_S,
+            self._cap_s,
+            self._path,
+            self._knots,
+            self.counts,
+            self._workspace,
+            0,
+        )
+
+    def energy(self) -> Float64:
+        """Return (N,) kinetic and potential energy, joules."""
+        v, w = self.states.velocity, self.states.spin
+        level = self.level
+        kinetic = 0.5 * (v**2).sum(axis=1) + 0.2 * level.radius**2 * (w**2).sum(axis=1)
+        total: Float64 = level.mass * (kinetic + level.gravity * self.states.position[:, 2])
+        return total
+
+    def depth(self) -> Float64:
+        """Return (N,) how deep each ball is in a solid, metres; negative where it is free."""
+        deepest = np.full(len(self._rows), -np.inf)
+        for solid in self._scenes.solid:
+            relative = self.states.position - solid.centre
+            if solid.slab >= 0:
+                relative[:, 2] -= self.states.slab[:, solid.slab]
+            beyond = np.abs(relative @ solid.axes.T) - solid.half
+            outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+            distance = np.where(outside > 0.0, outside, beyond.max(axis=1))
+            deepest = np.maximum(deepest, self.level.radius - distance)
+        return deepest
