@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ from roller_env.config import MAX_ENVS, EnvConfig
 from roller_env.divergence import report
 from roller_env.game import observations, step
 from roller_env.game.result import REWARD_TERMS, EpisodeResult
+from roller_env.game.rewards import POINTS, RewardMode
 from roller_env.game.state import GameState, score_percent
 from roller_env.game.step import Games, Rewarding
 from roller_env.game.tables import LevelTable
@@ -195,13 +196,17 @@ class Simulation:
         self._at = self._physics.columns
         self._bodies = Bodies.of(self._physics.state, self._at)
         self._rewarding = Rewarding(
-            np.array(config.reward_weights.terms), config.reward == "shaped", config.discount
+            np.array(config.reward_weights.terms),
+            config.reward_weights.completeness,
+            get_args(RewardMode).index(config.reward),
+            config.discount,
         )
         physics, games = self._physics.state, self._games
         self._prepare = Bound(step.prepare, games.preparing, physics, self._at, self._duration_s)
         self._conclude = Bound(
             step.conclude, games.concluding, physics, self._at, self._duration_s, self._rewarding
         )
+        self._measure = Bound(step.measure, games.concluding, physics, self._at, self._rewarding)
         self._observe = Bound(step.observe, games.showing, physics, self._at)
         self._every = np.arange(num_envs)
         self._ray_directions = observations.ray_directions()
@@ -487,18 +492,8 @@ class Simulation:
             rows: (n,).
             follows: (n,) whether the route up to where the ball is counts as passed.
         """
-        if self._rewarding.shaped and len(rows):
-            weight = self.config.reward_weights.progress
-            step.follow_route(
-                self.table.routes,
-                self._games.level_of,
-                rows,
-                self._physics.state,
-                self._at,
-                weight,
-                follows,
-                self.state.shaping,
-            )
+        if self._rewarding.potential != POINTS and len(rows):
+            self._measure(rows, follows)
 
     def _end_diverged(self, rows: Int64, path: Path, diverged: Bool, before: Float64) -> None:
         """Report the rows that diverged, and put their physics back to where it is finite.
@@ -639,7 +634,13 @@ class Simulation:
         wrong = rows.dtype == np.bool_ or any(row not in numbers for row in found)
         if wrong or len(set(found)) != len(found):
             raise ValueError(
-                f"rows: found {rows.tolist()}; must be different row numbers from 0 to "
+                f"rows: found {_few(found)}; must be different row numbers from 0 to "
                 f"{self.num_envs - 1}"
             )
         return rows.astype(np.int64)
+
+
+def _few(numbers: list[int]) -> str:
+    """Return numbers as text that is not too long to be read."""
+    shown = ", ".join(map(str, numbers[:8]))
+    return f"[{shown}, ... {len(numbers)} in all]" if len(numbers) > 8 else f"[{shown}]"

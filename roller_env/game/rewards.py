@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -14,7 +15,13 @@ from roller_env.arrays import Float64, Int64
 from roller_env.compiled import device_function
 from roller_env.game.result import REWARD_TERMS
 
-RewardMode = Literal["points", "shaped"]
+RewardMode = Literal["points", "shaped", "nearness"]
+
+POINTS, ROUTE, NEARNESS = range(3)
+"""What the potential of each `RewardMode` is of, in their order."""
+
+NEARNESS_M: Final = 6.0
+"""Distance from which on what is left to do draws the ball nearer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,22 +33,28 @@ class RewardWeights:
         finish: for reaching the finish. By default twice the progress: at the finish the shaping
             takes the potential back, and that step should still be worth taking.
         fall: for falling below the kill height.
-        progress: potential of a completed route, for the ``shaped`` reward only.
+        progress: potential of a completed route for the ``shaped`` reward, of being at the next
+            thing to do for ``nearness``.
+        completeness: power, 0 or more, of the share of the level's coins that are collected, by
+            which the finish is multiplied. 0 pays it in full, whatever was left lying.
     """
 
     coin: float = 1.0
     finish: float = 20.0
     fall: float = -1.0
     progress: float = 10.0
+    completeness: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse weights that are not finite numbers."""
-        checked = checks.each(
-            {
-                name: partial(checks.number, f"reward_weights.{name}", getattr(self, name))
-                for name in REWARD_TERMS
-            }
+        """Refuse what is no finite number, and a power below 0."""
+        asked: dict[str, Callable[[], Any]] = {
+            name: partial(checks.number, f"reward_weights.{name}", getattr(self, name))
+            for name in REWARD_TERMS
+        }
+        asked["completeness"] = lambda: checks.number(
+            "reward_weights.completeness", self.completeness, 0.0, 100.0, "a number from 0 to 100"
         )
+        checked = checks.each(asked)
         for name, value in checked.items():
             object.__setattr__(self, name, value)
 
@@ -125,6 +138,12 @@ def route_progress(
     behind = arc[waypoint] - math.sqrt(x * x + y * y + z * z)
     fraction: float = min(max(behind / total, 0.0), 1.0)
     return fraction
+
+
+@device_function
+def nearness(distance_m: float) -> float:
+    """Return 1 where the ball is at what it is to do next, 0 from `NEARNESS_M` on."""
+    return 1.0 - min(distance_m / NEARNESS_M, 1.0)
 
 
 @device_function

@@ -91,6 +91,12 @@ class GameState(NamedTuple):
         return self.of(COIN).collected
 
     @property
+    def achieved(self) -> Bool:
+        """(N, A) what is done once in an episode: coins taken, plates struck, triggers spent."""
+        flags = [array for array in _leaves(self.kinds) if array.dtype == bool and array.ndim == 2]
+        return np.concatenate(flags, axis=1)
+
+    @property
     def terminated(self) -> Bool:
         """(N,) whether the game is over for good: finished, fallen or diverged."""
         return self.finished | self.fallen | self.diverged

@@ -17,15 +17,23 @@ import numpy as np
 from roller_env.arrays import Bool, Float32, Float64, Int64
 from roller_env.compiled import compiled_with_packages, device_function, inlined
 from roller_env.game.cameras import settle
-from roller_env.game.kinds import all_hooks
+from roller_env.game.kinds import RULES, all_hooks
 from roller_env.game.observations import STATE_SIZE, rotated
 from roller_env.game.result import REWARD_TERMS
-from roller_env.game.rewards import ShapingState, next_waypoint, route_progress, shaping
+from roller_env.game.rewards import (
+    POINTS,
+    ROUTE,
+    nearness,
+    next_waypoint,
+    route_progress,
+    shaping,
+)
 from roller_env.game.slabs import lowering
 from roller_env.game.state import GameState
 from roller_env.game.tables import LevelTable, Movers, Regions, Routes
 from roller_env.physics.protocol import Columns
-from roller_env.pieces.rules import WORK, After, Before, CameraAsked, Noticed, Seen
+from roller_env.pieces.coin import COIN, distance_to_next
+from roller_env.pieces.rules import WORK, After, Before, CameraAsked, Noticed, Seen, distance2
 from roller_env.pieces.sweep import bounds, meets, time_of_fall, vector, visit
 from roller_env.units import frames
 
@@ -42,6 +50,7 @@ HANGING_S: Final = SPLASH_S + frames(10.0)
 up. Until then nothing moves and nothing happens."""
 
 _COIN, _FINISH, _FALL, _PROGRESS = (REWARD_TERMS.index(name) for name in REWARD_TERMS)
+_COINS: Final = RULES.index(COIN)
 
 _act = all_hooks("act")
 _notice = all_hooks("notice")
@@ -82,12 +91,14 @@ class Rewarding(NamedTuple):
 
     Attributes:
         weights: (terms,) by `roller_env.game.result.REWARD_TERMS`.
-        shaped: whether progress along the route pays.
+        completeness: power of the share of coins that the finish is multiplied by.
+        potential: what progress is measured by, if it pays: `POINTS`, `ROUTE` or `NEARNESS`.
         discount: of the shaping.
     """
 
     weights: Float64
-    shaped: bool
+    completeness: float
+    potential: int
     discount: float
 
 
@@ -425,11 +436,14 @@ def _pay(
     counts = games.step.end[env] > -np.inf
     terms[_COIN] = weights[_COIN] * games.step.coins[env, 0]
     terms[_FINISH] = weights[_FINISH] * (counts and state.finished[env])
+    if rewarding.completeness > 0.0 and games.tables[_COINS].total[level] > 0:
+        collected = state.kinds[_COINS].collected[env] / games.tables[_COINS].total[level]
+        terms[_FINISH] *= collected**rewarding.completeness
     terms[_FALL] = weights[_FALL] * games.step.fell[env]
     total = terms[_COIN] + terms[_FINISH] + terms[_FALL]
-    if rewarding.shaped:
+    if rewarding.potential != POINTS:
         before = state.shaping.potential[env]
-        _measure(games.routes, level, env, ball, weights[_PROGRESS], True, state.shaping)
+        _measure(games, level, env, ball, rewarding, True)
         after = state.shaping.potential[env]
         terms[_PROGRESS] = shaping(before, after, over, rewarding.discount)
         total += terms[_PROGRESS]
@@ -441,51 +455,49 @@ def _pay(
 
 @inlined
 def _measure(
-    routes: Routes,
-    level: int,
-    env: int,
-    ball: Float64,
-    weight: float,
-    follows: bool,
-    state: ShapingState,
+    games: Concluding, level: int, env: int, ball: Float64, rewarding: Rewarding, follows: bool
 ) -> None:
     """Set the potential of where a ball is, perhaps after following the route up to there."""
-    points, length = routes.points[level], routes.length[level]
-    if follows:
-        radius = routes.radius[level]
-        state.waypoint[env] = next_waypoint(ball, points, length, radius, state.waypoint[env])
-    waypoint = state.waypoint[env]
-    progress = route_progress(ball, points, routes.arc[level], length, waypoint)
-    state.potential[env] = weight * progress
+    routes, shaping_of = games.routes, games.state.shaping
+    if rewarding.potential == ROUTE:
+        points, length = routes.points[level], routes.length[level]
+        waypoint = shaping_of.waypoint[env]
+        if follows:
+            waypoint = next_waypoint(ball, points, length, routes.radius[level], waypoint)
+            shaping_of.waypoint[env] = waypoint
+        progress = route_progress(ball, points, routes.arc[level], length, waypoint)
+    else:
+        coins = games.state.kinds[_COINS]
+        distance = distance_to_next(games.tables[_COINS], coins, level, env, ball)
+        if distance == np.inf:
+            distance = np.sqrt(distance2(games.regions.centre[level, games.owns[-1, 0]], ball))
+        progress = nearness(distance)
+    shaping_of.potential[env] = rewarding.weights[_PROGRESS] * progress
 
 
 @kernel
-def follow_route(
-    routes: Routes,
-    level_of: Int64,
-    envs: Int64,
+def measure(
+    games: Concluding,
     physics: Float64,
     at: Columns,
-    weight: float,
+    rewarding: Rewarding,
+    envs: Int64,
     follows: Bool,
-    state: ShapingState,
 ) -> None:
     """Set the potential of envs whose ball was put somewhere.
 
     Args:
-        routes: of the levels.
-        level_of: (N,) each env's level.
-        envs: (n,) which of them.
+        games: all of them.
         physics: (N, width) the state of the physics.
         at: where everything is in it.
-        weight: potential of a completed route.
+        rewarding: what a step is worth.
+        envs: (n,) which of them.
         follows: (n,) whether what lies up to there counts as passed.
-        state: written.
     """
     for number in range(len(envs)):
         env = envs[number]
         ball = physics[env, at.position : at.position + 3]
-        _measure(routes, level_of[env], env, ball, weight, follows[number], state)
+        _measure(games, games.level_of[env], env, ball, rewarding, follows[number])
 
 
 @kernel

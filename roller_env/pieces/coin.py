@@ -265,6 +265,34 @@ def _show(now: Seen, table: CoinTable, state: CoinState, own: Own) -> None:
 
 
 @device_function
+def distance_to_next(
+    table: CoinTable, state: CoinState, level: int, env: int, ball: Float64
+) -> float:
+    """Return the distance from the ball, (3,) metres, to the nearest coin left; ``inf`` for none.
+
+    The search goes outwards along x, as that of what is shown does.
+    """
+    count, least2 = table.total[level], np.inf
+    if np.isnan(ball[0]):
+        return least2
+    x = table.x[level, :count]
+    right = np.searchsorted(x, ball[0])
+    left = right - 1
+    while left >= 0 or right < count:
+        back = ball[0] - x[left] if left >= 0 else np.inf
+        ahead = x[right] - ball[0] if right < count else np.inf
+        if min(back, ahead) ** 2 > least2:
+            break
+        coin = table.order[level, left if back <= ahead else right]
+        left -= back <= ahead
+        right += back > ahead
+        if not state.taken[env, coin]:
+            least2 = min(least2, distance2(table.at[level, coin], ball))
+    distance: float = np.sqrt(least2)
+    return distance
+
+
+@device_function
 def _keep_nearest(coin: int, new2: float, nearest: Float64, near2: Float64) -> None:
     """Put a coin into its place among the nearest, if it is one of them."""
     place = NEAREST_COINS

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from roller_env import checks
-from roller_env.arrays import Float64
+from roller_env.arrays import Float64, Int64
 from roller_env.game.actions import DIRECTIONS, forces
 from roller_env.game.observations import STATE_ENTRIES, layout
 from roller_env.level import Level
@@ -115,12 +115,8 @@ class ScriptedPlayer:
             stop, final_speed = self._stops[self._next - 1], 0.0
             self._since_s = float(simulation.time_s[0])
         way = stop.at[:2] - ball[:2]
-        distance = math.hypot(*way)
-        speed = min(CRUISE_M_S, math.sqrt(final_speed**2 + 2.0 * BRAKING_M_S2 * distance))
-        wanted = way / max(distance, 1e-9) * speed
-        mass = simulation.level.ball.mass_kg
-        push = mass * (wanted - velocity) / RESPONSE_S
-        best = self._with_noise(int(np.linalg.norm(_PUSHES - push, axis=1).argmin()))
+        mass_kg = simulation.level.ball.mass_kg
+        best = self._with_noise(int(steering(way[None], velocity[None], mass_kg, final_speed)[0]))
         return _PUSHES[best : best + 1].copy()
 
     def _with_noise(self, direction: int) -> int:
@@ -180,6 +176,25 @@ class ScriptedPlayer:
             if _meets(begin, finish, half):
                 return True
         return False
+
+
+def steering(
+    way: Float64, velocity: Float64, mass_kg: float, final_speed: float = CORNER_M_S
+) -> Int64:
+    """Return which of `DIRECTIONS` to hold, (n,), to come to places at a speed.
+
+    Args:
+        way: (n, 2) from the balls to the places, metres, world x and y.
+        velocity: (n, 2) of the balls, m/s, world x and y.
+        mass_kg: of a ball.
+        final_speed: at which to be there, m/s.
+    """
+    distance = np.linalg.norm(way, axis=1, keepdims=True)
+    speed = np.minimum(CRUISE_M_S, np.sqrt(final_speed**2 + 2.0 * BRAKING_M_S2 * distance))
+    wanted = way / np.maximum(distance, 1e-9) * speed
+    push = mass_kg * (wanted - velocity) / RESPONSE_S
+    best: Int64 = np.linalg.norm(_PUSHES - push[:, None], axis=2).argmin(axis=1)
+    return best
 
 
 def relabelled(replay: Replay) -> Float64:

@@ -17,7 +17,7 @@ import json
 import random
 import zipfile
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -32,9 +32,11 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 
+from roller_env.arrays import Int64
 from roller_env.envs.sb3 import VecSnapshot
+from roller_env.game.actions import DIRECTIONS
 from roller_env.game.cameras import MODES
-from roller_env.game.result import REWARD_TERMS
+from roller_env.pieces.coin import COIN
 from roller_env.problems import shown
 from roller_env.simulation import Snapshot
 from roller_env.training.config import TrainingConfig
@@ -44,6 +46,7 @@ from roller_env.training.curriculum import (
     joined,
     separate,
 )
+from roller_env.training.exploration import Journeys
 from roller_env.training.files import RunError, read_whole, write_atomically
 from roller_env.training.normalisation import statistics
 
@@ -52,36 +55,17 @@ Tree = dict[str, Any]
 
 MAX_BYTES: Final = 2**32
 
-_HEADER: Final = b"roller-checkpoint-2 sha256 "
+_HEADER: Final = b"roller-checkpoint-3 sha256 "
 """Starts the file; the number is the format's, raised when an old file can no longer be read."""
 
 _HEADER_LENGTH: Final = len(_HEADER) + hashlib.sha256().digest_size * 2 + 1
 _STATE, _ARRAYS = "state.json", "arrays.safetensors"
 _BETWEEN_NAMES: Final = "/"
-_RENAMED: Final = {
-    "coin_taken": "coin/taken",
-    "points": "coin/collected",
-    "plate_struck": "plate/struck",
-    "plate_down": "plate/down",
-    "gate_opening": "signals",
-    "thrust_s": "lift_pad/thrust_s",
-    "trigger_spent": "camera_trigger/spent",
-    "camera_delay_s": "camera_trigger/delay_s",
-    "camera_mode": "camera/mode",
-    "camera_x": "camera/x",
-    "waypoint": "shaping/waypoint",
-}
-_NEW: Final = {
-    "total_reward": np.zeros(()),
-    "reward_terms": np.zeros(len(REWARD_TERMS)),
-    "shaping/potential": np.zeros(()),
-    "checkpoint/last": np.array(-1),
-}
-"""Arrays of a game's state by the names that they had in checkpoints of before, and those that were
-not there, as one env has them at the start."""
-
 _VARYING: Final = ("physics", "game", "level_of_row", "generators")
 """Of a `Snapshot`; its other fields are what the configuration says."""
+
+_OF_CURRICULUM: Final = ("success", "age", "task", "from_start", "clock", "generator")
+_JOURNEYS: Final = tuple(field.name for field in fields(Journeys))
 
 _REMEDY: Final = "remove the run's directory to train again from the start"
 
@@ -187,7 +171,7 @@ def load_checkpoint(file: Path) -> Checkpoint:
             file=file,
             config=TrainingConfig.model_validate(facts["config"]),
             progress=Progress(int(progress["steps"]), float(progress["wall_s"])),
-            state=_nested({**facts["state"], **_of_today(arrays)}),
+            state=_nested({**facts["state"], **arrays}),
         )
     except (zipfile.BadZipFile, SafetensorError, ValidationError) as error:
         raise _damaged(file, str(error)) from None
@@ -202,27 +186,6 @@ def _members(body: bytes) -> tuple[Any, dict[str, npt.NDArray[Any]]]:
             if container.getinfo(name).file_size > len(body):
                 raise ValueError(f"{name} is larger than the file")
         return from_json(container.read(_STATE)), safetensors.numpy.load(container.read(_ARRAYS))
-
-
-def _of_today(arrays: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
-    """Return a checkpoint's arrays under the names that a game's state has now.
-
-    What games had not before begins at 0: nothing but what an episode's last info tells depends on
-    it, or it is found again when the game is restored.
-    """
-    today: dict[str, npt.NDArray[Any]] = {}
-    for name, values in arrays.items():
-        game, _, leaf = name.rpartition(_BETWEEN_NAMES)
-        if game.endswith("game"):
-            leaf = _RENAMED.get(leaf, leaf)
-        today[f"{game}{_BETWEEN_NAMES}{leaf}" if game else leaf] = values
-    for name, steps in arrays.items():
-        game, _, leaf = name.rpartition(_BETWEEN_NAMES)
-        if game.endswith("game") and leaf == "steps":
-            for new, value in _NEW.items():
-                every = np.repeat(value[None], len(steps), axis=0)
-                today.setdefault(f"{game}{_BETWEEN_NAMES}{new}", every)
-    return today
 
 
 def _damaged(file: Path, fault: str) -> CheckpointError:
@@ -309,42 +272,67 @@ def _set_moments(entry: RunningMeanStd, moments: Tree) -> None:
 
 
 def _of_curriculum(snapshot: CurriculumSnapshot) -> Tree:
-    waypoints = [waypoint for waypoint, games in snapshot.games.items() for _ in games]
+    kept_for = [task for task, games in snapshot.games.items() for _ in games]
     games = [game for games in snapshot.games.values() for game in games]
     return {
         "level": snapshot.environments.games.level.model_dump_json(),
         "games": _of_snapshot(snapshot.environments.games),
         "returns": snapshot.environments.returns,
         "lengths": snapshot.environments.lengths,
-        "waypoint": snapshot.waypoint,
-        "from_start": snapshot.from_start,
-        "generator": snapshot.generator,
-        "kept_at": waypoints,
+        "ticks": len(snapshot.recent),
+        "recent": _of_snapshot(joined(snapshot.recent)) if snapshot.recent else {},
+        "kept_for": kept_for,
         "kept": _of_snapshot(joined(games)) if games else {},
+        "journeys": {name: getattr(snapshot.journeys, name) for name in _JOURNEYS},
+        **{name: getattr(snapshot, name) for name in _OF_CURRICULUM},
     }
 
 
 def _curriculum(tree: Tree, own: CurriculumSnapshot) -> CurriculumSnapshot:
-    """Return the snapshot that a tree is, of the kind that the environments' own is."""
-    games = own.environments.games
+    """Return the snapshot that a tree is, of the kind that the environments' own is.
+
+    Raises:
+        ValueError: it is of another level, or numbers point at what is not there.
+    """
+    games, rows, ticks = own.environments.games, len(own.age), int(tree["ticks"])
     if tree["level"] != games.level.model_dump_json():
         raise ValueError(f"the level {games.level.name!r} has been changed since it was written")
+    kept_for, tasks = np.array(tree["kept_for"], dtype=np.int64), len(own.success)
+    _check_numbers("kept_for", kept_for, 0, tasks)
+    _check_numbers("task", tree["task"], -1, tasks)
+    _check_numbers("coin", tree["journeys"]["coin"], -1, games.game.of(COIN).taken.shape[1])
+    _check_numbers("direction", tree["journeys"]["direction"], 0, len(DIRECTIONS))
     kept: dict[int, list[Snapshot]] = {}
-    if tree["kept_at"]:
-        rows = separate(_snapshot(tree["kept"], games, len(tree["kept_at"])))
-        for waypoint, game in zip(tree["kept_at"], rows, strict=True):
-            kept.setdefault(int(waypoint), []).append(game)
+    if len(kept_for):
+        each = separate(_snapshot(tree["kept"], games, len(kept_for)))
+        for task, game in zip(kept_for.tolist(), each, strict=True):
+            kept.setdefault(task, []).append(game)
+    recent: tuple[Snapshot, ...] = ()
+    if ticks:
+        whole = _snapshot(tree["recent"], games, ticks * rows)
+        recent = tuple(whole.take(tick * rows + np.arange(rows)) for tick in range(ticks))
     return CurriculumSnapshot(
         environments=VecSnapshot(
-            games=_snapshot(tree["games"], games, len(tree["returns"])),
+            games=_snapshot(tree["games"], games, rows),
             returns=tree["returns"],
             lengths=tree["lengths"],
         ),
+        recent=recent,
         games=kept,
-        waypoint=tree["waypoint"],
-        from_start=tree["from_start"],
-        generator=tree["generator"],
+        journeys=Journeys(**{name: tree["journeys"][name] for name in _JOURNEYS}),
+        **{name: tree[name] for name in _OF_CURRICULUM},
     )
+
+
+def _check_numbers(name: str, numbers: Int64, low: int, end: int) -> None:
+    """Refuse numbers outside of ``low`` to ``end``, which is not one of them.
+
+    Raises:
+        ValueError: says which.
+    """
+    wrong = numbers[(numbers < low) | (numbers >= end)]
+    if len(wrong):
+        raise ValueError(f"{name}: found {wrong[0]}; must be {low} to {end - 1}")
 
 
 def _of_snapshot(snapshot: Snapshot) -> Tree:
@@ -372,8 +360,7 @@ def _snapshot(tree: Tree, own: Snapshot, rows: int) -> Snapshot:
         ("camera/mode", game["camera/mode"], len(MODES)),
         ("waypoint", game["shaping/waypoint"], 1 if route is None else len(route.points)),
     ):
-        if ((numbers < 0) | (numbers >= count)).any():
-            raise ValueError(f"{name}: found {numbers.tolist()}; must be 0 to {count - 1}")
+        _check_numbers(name, numbers, 0, count)
     generators = tuple(tree["generators"])
     if len(generators) != rows:
         raise ValueError(f"generators: found {len(generators)}; wanted {rows}")

@@ -152,9 +152,8 @@ class TrainingConfig(_Frozen):
             than in training, such as ``physics: default`` after a training with ``fast``.
         seed: of the environments, the network's initial weights and the order of the samples.
         num_envs: environments that are stepped together.
-        start_state_curriculum: fraction of the training's episodes that begin at a waypoint of the
-            route that the agent has reached before, not at the level's start; see
-            `roller_env.training.curriculum`.
+        start_state_curriculum: fraction of the environments that do not play from the level's start
+            but practise what is achieved least surely; see `roller_env.training.curriculum`.
         total_steps: environment steps, over all environments, after which training ends.
         wall_clock_budget_s: training ends after this time at the latest; None for no limit.
             A run that ends by time is not repeatable bit for bit on another machine.

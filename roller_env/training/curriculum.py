@@ -1,9 +1,13 @@
-"""A start-state curriculum: some episodes begin where the agent has been before.
+"""A start-state curriculum: some games practise what the agent achieves least surely.
 
-A long level teaches its end slowly when every attempt at it must first play the whole beginning. So
-the games an agent has brought to each waypoint of the route are kept, and a fraction of the
-episodes begins from one of them (Salimans & Chen 2018, Ecoffet et al. 2021 do the like). Only
-training does this: evaluation always plays from the start.
+A long level teaches its end slowly when every attempt at it must first play the whole beginning,
+and what lies beside the way is learnt late or never: an agent that rolls past a coin into the
+finish meets the coin by chance once in ten thousand steps. So whatever is achieved in an episode,
+by the agent or by explorers that play at random, is kept together with the game as it was a while
+before. A part of the environments begins there and tries to achieve it again, the more often the
+less often that succeeds, first from half a second before and later from further back (Salimans &
+Chen 2018 and Florensa et al. 2017 go backwards like this, Ecoffet et al. 2021 keep what explorers
+find). Only training does this: evaluation always plays from the start.
 """
 
 from __future__ import annotations
@@ -16,125 +20,318 @@ import numpy as np
 from stable_baselines3.common.vec_env import VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
-from roller_env.arrays import Bool, Int64
-from roller_env.envs.sb3 import RollerVecEnv, VecSnapshot
+from roller_env.arrays import Bool, Float64, Int64
+from roller_env.envs.sb3 import TRUNCATED, RollerVecEnv, VecSnapshot
 from roller_env.envs.spaces import shape_observation
 from roller_env.game.state import GameState
 from roller_env.simulation import Snapshot
+from roller_env.training.exploration import Explorers, Journeys
 
 FROM_START: Final = "from_start"
 """Key of a finished episode's info: whether it began at the level's start."""
 
+TICK_S: Final = 0.5
+"""All games are looked back at in steps of this length."""
+
+LOOKS_BACK: Final = (1, 2, 4, 8)
+"""How many of these steps lie at most between a kept game and what it achieved."""
+
+_TRIES: Final = 1.5
+"""Times that long a game is practised at most, and `_GRACE_S` more."""
+
+_GRACE_S: Final = 2.0
+
+_FREE_S: Final = 5.0
+"""A game without a goal, taken over from an explorer, is practised this long."""
+
+_FREE: Final = 0.3
+"""Fraction of the practice that begins where an explorer is, whatever can be done from there."""
+
 _KEPT: Final = 32
-"""Games kept of each waypoint; a newer one takes the place of any."""
+"""Games kept for each task; a newer one takes the place of any."""
 
 _RENEWAL: Final = 0.1
-"""Fraction of the arrivals that are kept when a waypoint has all its games already."""
+"""Fraction of the games that are kept when a task has all its games already."""
+
+_MEMORY: Final = 0.03
+"""Weight of the last trial in a task's rate of success."""
+
+_LEAST: Final = 0.1
+"""Weight, beside its rate of failure, with which a task is chosen that never fails."""
+
+_NONE: Final = -1
 
 
 @dataclass(frozen=True, eq=False)
 class CurriculumSnapshot:
-    """Everything that the future of a `StartStateCurriculum` depends on."""
+    """Everything that the future of a `StartStateCurriculum` depends on.
+
+    Attributes:
+        environments: all rows, the explorers' too.
+        recent: the games a tick ago, two ticks ago and so on.
+        games: those kept, by task.
+        success: (tasks,) rate of success, 0 to 1.
+        age: (rows,) steps since a game began or was put there.
+        task: (rows,) what a row is practising; -1 for nothing.
+        from_start: (rows,) whether a game began at the start.
+        clock: steps since the last tick.
+        journeys: of the explorers.
+        generator: state of the random generator.
+    """
 
     environments: VecSnapshot
+    recent: tuple[Snapshot, ...]
     games: dict[int, list[Snapshot]]
-    waypoint: Int64
+    success: Float64
+    age: Int64
+    task: Int64
     from_start: Bool
+    clock: int
+    journeys: Journeys
     generator: Mapping[str, Any]
 
 
 class StartStateCurriculum(VecEnvWrapper):
-    """Begins a fraction of the episodes at waypoints that were reached before, all as often."""
+    """Lets the first rows practise and the rest play from the start; hides the explorers' rows.
 
-    def __init__(self, environments: RollerVecEnv, fraction: float, seed: int) -> None:
+    A task is a goal, one of `GameState.achieved` or the finish, and how far back its games begin;
+    its number is ``goal * len(LOOKS_BACK) + look``. Practice is cut short when it takes too long.
+    The level's own time limit is, to the learner, an end like others: the observation shows the
+    time that is left (Pardo et al. 2018).
+    """
+
+    def __init__(
+        self, environments: RollerVecEnv, fraction: float, seed: int, explorers: int = 0
+    ) -> None:
         """Wrap environments.
 
         Args:
-            environments: to wrap.
-            fraction: of the episodes that begin at a waypoint, 0 to 1.
-            seed: of the choice.
+            environments: to wrap; the last rows are the explorers'.
+            fraction: of the other rows that practise, 0 to 1.
+            seed: of all choices.
+            explorers: number of rows that explore.
         """
         super().__init__(environments)
         self.environments = environments
-        self._fraction = fraction
+        self.num_envs = environments.num_envs - explorers
         self._rng = np.random.default_rng(seed)
+        simulation = environments.simulation
+        self._explorers = Explorers(simulation, explorers, self._rng)
+        self._practises = np.arange(environments.num_envs) < round(fraction * self.num_envs)
+        self._shows_time = simulation.config.observation != "pixels"
+        self._goals = simulation.state.achieved.shape[1] + 1
+        self._tick = max(round(TICK_S / simulation.config.control_dt_s), 1)
+        looks = self._tick * np.array(LOOKS_BACK)
+        self._patience = np.rint(looks * _TRIES).astype(np.int64) + self._steps(_GRACE_S)
         self._games: dict[int, list[Snapshot]] = {}
-        self._waypoint = np.zeros(self.num_envs, dtype=np.int64)
-        self._from_start = np.ones(self.num_envs, dtype=bool)
+        self._success = np.zeros(self._goals * len(LOOKS_BACK))
+        self._begin_anew()
+
+    def _steps(self, seconds: float) -> int:
+        return round(seconds / self.environments.simulation.config.control_dt_s)
+
+    def _begin_anew(self) -> None:
+        rows = self.environments.num_envs
+        self._recent: tuple[Snapshot, ...] = ()
+        self._age = np.zeros(rows, dtype=np.int64)
+        self._task = np.full(rows, _NONE)
+        self._from_start = np.ones(rows, dtype=bool)
+        self._clock = 0
 
     def reset(self) -> Any:
         """Begin every episode at the start."""
         observations = self.environments.reset()
-        self._waypoint[:] = self.environments.simulation.state.shaping.waypoint
-        self._from_start[:] = True
-        return observations
+        self._begin_anew()
+        self._achieved = self.environments.simulation.state.achieved
+        return self._learner_s(observations)
+
+    def _learner_s(self, observations: Any) -> Any:
+        if isinstance(observations, dict):
+            return {name: values[: self.num_envs] for name, values in observations.items()}
+        return observations[: self.num_envs]
+
+    def step_async(self, actions: Any) -> None:
+        """Let the explorers act as well."""
+        if len(self._explorers.rows):
+            actions = np.concatenate([actions, self._explorers.actions()])
+        self.environments.step_async(actions)
 
     def step_wait(self) -> VecEnvStepReturn:
-        """Step, keep what was reached, and begin some of the new episodes elsewhere."""
+        """Step, keep what was achieved, and begin some of the new episodes elsewhere."""
         observations, rewards, dones, infos = self.environments.step_wait()
-        ended = np.flatnonzero(dones)
-        for row in ended:
+        for row in np.flatnonzero(dones).tolist():
             infos[row][FROM_START] = bool(self._from_start[row])
-        self._from_start[ended] = True
-        if self._fraction > 0.0:
-            self._keep(dones)
-            self._begin(ended[self._rng.random(len(ended)) < self._fraction], observations)
-        return observations, rewards, dones, infos
+            if self._shows_time:
+                infos[row][TRUNCATED] = False
+        if self._practises.any():
+            self._practise(observations, dones, infos)
+        mine = slice(self.num_envs)
+        return self._learner_s(observations), rewards[mine], dones[mine], list(infos[mine])
 
-    def _keep(self, dones: Bool) -> None:
-        """Keep the games that have just come to a waypoint."""
-        simulation = self.environments.simulation
-        waypoint = simulation.state.shaping.waypoint
-        for row in np.flatnonzero((waypoint > self._waypoint) & ~dones):
-            games = self._games.setdefault(int(waypoint[row]), [])
-            if len(games) < _KEPT:
-                games.append(simulation.snapshot(np.array([row])))
-            elif self._rng.random() < _RENEWAL:
-                games[int(self._rng.integers(_KEPT))] = simulation.snapshot(np.array([row]))
-        self._waypoint[:] = waypoint
+    def _practise(self, observations: Any, dones: Bool, infos: Sequence[dict[str, Any]]) -> None:
+        """Keep, judge and begin games; ``dones`` and ``infos`` tell what was cut short."""
+        state = self.environments.simulation.state
+        finished = np.zeros(len(dones), dtype=bool)
+        finished[dones] = [infos[row]["success"] for row in np.flatnonzero(dones).tolist()]
+        done_now = np.column_stack([state.achieved & ~dones[:, None], finished])
+        news = done_now.copy()
+        news[:, :-1] &= ~self._achieved
+        self._age += 1
+        self._clock += 1
+        self._keep(news)
+        tired = self._practises & ~self._from_start & ~dones & (self._age >= self._limits())
+        for row in np.flatnonzero(tired).tolist():
+            shown = observations
+            infos[row]["terminal_observation"] = (
+                {name: values[row].copy() for name, values in shown.items()}
+                if isinstance(shown, dict)
+                else shown[row].copy()
+            )
+            infos[row][TRUNCATED], infos[row][FROM_START] = True, False
+        self._judge(done_now, dones | tired)
+        dones |= tired
+        self._age[dones] = 0
+        self._from_start[dones] = True
+        self._achieved = state.achieved
+        self._begin(np.flatnonzero(dones & self._practises), observations)
+        self._explorers.journeys.left[dones[self._explorers.rows]] = 0
+        self._send_out(self._explorers.arrived())
+        if self._clock == self._tick:
+            self._clock = 0
+            latest = self.environments.simulation.snapshot()
+            self._recent = (latest, *self._recent)[: LOOKS_BACK[-1]]
+
+    def _limits(self) -> Int64:
+        """Return after how many steps each row has practised enough, (rows,)."""
+        patience = self._patience[self._task % len(LOOKS_BACK)]
+        limits: Int64 = np.where(self._task == _NONE, self._steps(_FREE_S), patience)
+        return limits
+
+    def _keep(self, news: Bool) -> None:
+        """Keep the games that have just achieved something as they were before it."""
+        rows, goals = np.nonzero(news)
+        for row, goal in zip(rows.tolist(), goals.tolist(), strict=True):
+            for look, ticks in enumerate(LOOKS_BACK):
+                ago = self._clock + (ticks - 1) * self._tick
+                if ticks <= len(self._recent) and ago <= self._age[row]:
+                    self._keep_one(goal, look, self._recent[ticks - 1], row)
+
+    def _keep_one(self, goal: int, look: int, past: Snapshot, row: int) -> None:
+        games = self._games.setdefault(goal * len(LOOKS_BACK) + look, [])
+        if len(games) < _KEPT:
+            games.append(past.take([row]))
+        elif self._rng.random() < _RENEWAL:
+            place = int(self._rng.integers(_KEPT))
+            if goal == self._goals - 1:
+                # To finish with all coins is what is hardest, so of that the best are kept.
+                coins = [int(game.game.coins[0]) for game in games]
+                place = int(np.argmin(coins))
+                if past.game.coins[row] < coins[place]:
+                    return
+            games[place] = past.take([row])
+
+    def _judge(self, done_now: Bool, over: Bool) -> None:
+        """Count the trials that are over, or have succeeded."""
+        rows = np.flatnonzero(self._task != _NONE)
+        succeeded = done_now[rows, self._task[rows] // len(LOOKS_BACK)]
+        for row, success in zip(rows, succeeded, strict=True):
+            if success or over[row]:
+                task = self._task[row]
+                self._success[task] += _MEMORY * (float(success) - self._success[task])
+        # What is done goes on until it takes too long, now without a goal.
+        self._task[rows[over[rows]]] = _NONE
+        self._task[rows[succeeded]] = _NONE
 
     def _begin(self, rows: Int64, observations: Any) -> None:
-        """Put kept games into rows, and what they show into the observations."""
+        """Put kept games and explorers' games into rows, and what they show where it belongs."""
         if not len(rows) or not self._games:
             return
         simulation = self.environments.simulation
-        waypoints = sorted(self._games)
-        chosen = []
-        for _ in rows:
-            games = self._games[waypoints[int(self._rng.integers(len(waypoints)))]]
-            chosen.append(games[int(self._rng.integers(len(games)))])
-        own = simulation.snapshot(rows).generators
-        simulation.restore(replace(joined(chosen), generators=own), rows)
+        free = self._rng.random(len(rows)) < _FREE
+        explored = self._explorers.rows[~simulation.state.over[self._explorers.rows]]
+        if not len(explored):
+            free[:] = False
+        games: list[Snapshot] = []
+        self._task[rows] = _NONE
+        if not free.all():
+            self._task[rows[~free]], games = self._drawn(int((~free).sum()))
+        if free.any():
+            drawn = self._rng.integers(len(explored), size=int(free.sum()))
+            games += separate(simulation.snapshot(explored).take(drawn))
+        self._put(games, np.concatenate([rows[~free], rows[free]]))
+        self._from_start[rows] = False
         fresh = shape_observation(simulation.config, simulation.observe(rows))
         if isinstance(observations, dict):
             for name, values in observations.items():
                 values[rows] = fresh[name]
         else:
             observations[rows] = fresh
-        self._waypoint[rows] = simulation.state.shaping.waypoint[rows]
-        self._from_start[rows] = False
+
+    def _send_out(self, rows: Int64) -> None:
+        """Put explorers where something was achieved, or at the start, and let them set out."""
+        if not len(rows):
+            return
+        from_start = self._rng.random(len(rows)) < 1.0 / (1 + len(self._games))
+        if from_start.any():
+            self.environments.simulation.reset(rows[from_start])
+            self._settle(rows[from_start])
+        if not from_start.all():
+            _, games = self._drawn(int((~from_start).sum()))
+            self._put(games, rows[~from_start])
+        self._explorers.set_out(rows)
+
+    def _drawn(self, count: int) -> tuple[Int64, list[Snapshot]]:
+        """Return tasks, (count,), most often those that fail most, and a game of each."""
+        tasks = np.array(sorted(self._games))
+        weights = 1.0 + _LEAST - self._success[tasks]
+        drawn = self._rng.choice(tasks, count, p=weights / weights.sum())
+        kept = [self._games[int(task)] for task in drawn]
+        return drawn, [games[int(self._rng.integers(len(games)))] for games in kept]
+
+    def _put(self, games: Sequence[Snapshot], rows: Int64) -> None:
+        """Put games of one row each into rows, which keep their random generators."""
+        own = self.environments.simulation.snapshot(rows).generators
+        zeros = np.zeros(len(rows))
+        put = replace(joined(games), generators=own)
+        self.environments.set_state(VecSnapshot(put, zeros, zeros.astype(np.int64)), rows)
+        self._settle(rows)
+
+    def _settle(self, rows: Int64) -> None:
+        self._age[rows] = 0
+        self._achieved[rows] = self.environments.simulation.state.achieved[rows]
 
     def snapshot(self) -> CurriculumSnapshot:
         """Return the state of all rows and what was kept; as copies."""
         return CurriculumSnapshot(
             environments=self.environments.get_state(),
-            games={waypoint: list(games) for waypoint, games in self._games.items()},
-            waypoint=self._waypoint.copy(),
+            recent=self._recent,
+            games={task: list(games) for task, games in self._games.items()},
+            success=self._success.copy(),
+            age=self._age.copy(),
+            task=self._task.copy(),
             from_start=self._from_start.copy(),
+            clock=self._clock,
+            journeys=self._explorers.journeys.copy(),
             generator=self._rng.bit_generator.state,
         )
 
     def restore(self, snapshot: CurriculumSnapshot) -> None:
         """Put everything back; the same actions then give the same bits."""
         self.environments.set_state(snapshot.environments)
-        self._games = {waypoint: list(games) for waypoint, games in snapshot.games.items()}
-        self._waypoint[:] = snapshot.waypoint
-        self._from_start[:] = snapshot.from_start
+        self._recent = snapshot.recent
+        self._games = {task: list(games) for task, games in snapshot.games.items()}
+        self._success = snapshot.success.copy()
+        self._age = snapshot.age.copy()
+        self._task = snapshot.task.copy()
+        self._from_start = snapshot.from_start.copy()
+        self._clock = snapshot.clock
+        self._explorers.journeys = snapshot.journeys.copy()
         self._rng.bit_generator.state = snapshot.generator
+        self._achieved = self.environments.simulation.state.achieved
 
 
 def joined(games: Sequence[Snapshot]) -> Snapshot:
-    """Return snapshots of one row each as one of many rows."""
+    """Return snapshots of one row each, or more, as one of many rows."""
     return replace(
         games[0],
         physics=np.concatenate([game.physics for game in games]),

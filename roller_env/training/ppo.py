@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import torch
@@ -25,6 +25,9 @@ from roller_env.training.display import ProgressDisplay
 from roller_env.training.files import RunFiles
 from roller_env.training.logs import STEPS, ContinuingCSV, ContinuingTensorBoard
 from roller_env.training.network import network_class, network_options
+
+_ROWS_PER_EXPLORER: Final = 4
+"""Environments that are learnt from for each that only explores."""
 
 
 def learn(config: TrainingConfig, files: RunFiles) -> tuple[PPO, Progress]:
@@ -81,10 +84,12 @@ def is_complete(config: TrainingConfig, progress: Progress) -> bool:
 
 def make_environments(config: TrainingConfig) -> StartStateCurriculum:
     """Return the environments that a configuration trains in."""
+    fraction = config.start_state_curriculum
+    explorers = -(-config.num_envs // _ROWS_PER_EXPLORER) if fraction > 0.0 else 0
     environments = RollerVecEnv(
-        num_envs=config.num_envs, seed=config.seed, **config.environment.keywords()
+        num_envs=config.num_envs + explorers, seed=config.seed, **config.environment.keywords()
     )
-    return StartStateCurriculum(environments, config.start_state_curriculum, config.seed)
+    return StartStateCurriculum(environments, fraction, config.seed, explorers)
 
 
 def new_model(config: TrainingConfig, environments: StartStateCurriculum) -> PPO:
