@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,7 @@ from roller_env.config import MAX_ENVS, EnvConfig
 from roller_env.divergence import report
 from roller_env.game import observations, step
 from roller_env.game.result import REWARD_TERMS, EpisodeResult
-from roller_env.game.rewards import POINTS, RewardMode
+from roller_env.game.rewards import POINTS
 from roller_env.game.state import GameState, score_percent
 from roller_env.game.step import Games, Rewarding
 from roller_env.game.tables import LevelTable
@@ -195,12 +195,7 @@ class Simulation:
         )
         self._at = self._physics.columns
         self._bodies = Bodies.of(self._physics.state, self._at)
-        self._rewarding = Rewarding(
-            np.array(config.reward_weights.terms),
-            config.reward_weights.completeness,
-            get_args(RewardMode).index(config.reward),
-            config.discount,
-        )
+        self._rewarding = Rewarding.of(config.reward_weights, config.reward, config.discount)
         physics, games = self._physics.state, self._games
         self._prepare = Bound(step.prepare, games.preparing, physics, self._at, self._duration_s)
         self._conclude = Bound(

@@ -10,7 +10,7 @@ coins and ends with the finish; the fall comes after that.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, get_args
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from roller_env.game.result import REWARD_TERMS
 from roller_env.game.rewards import (
     POINTS,
     ROUTE,
+    RewardMode,
+    RewardWeights,
     nearness,
     next_waypoint,
     route_progress,
@@ -100,6 +102,12 @@ class Rewarding(NamedTuple):
     completeness: float
     potential: int
     discount: float
+
+    @staticmethod
+    def of(weights: RewardWeights, reward: RewardMode, discount: float) -> Rewarding:
+        """Return what the options of an environment mean."""
+        potential = get_args(RewardMode).index(reward)
+        return Rewarding(np.array(weights.terms), weights.completeness, potential, discount)
 
 
 class Preparing(NamedTuple):

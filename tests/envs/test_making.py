@@ -16,6 +16,7 @@ from roller_env import ENV_IDS
 from roller_env.config import EnvConfig, make_config
 from roller_env.envs.single import RollerEnv
 from roller_env.envs.vector import RollerVectorEnv
+from roller_env.game.result import REWARD_TERMS
 from roller_env.game.rewards import RewardWeights
 from roller_env.level import load_level, shipped_levels
 from roller_env.level.load import levels_directory
@@ -177,7 +178,7 @@ def makers(options: dict[str, Any]) -> list[Callable[[], Any]]:
     return ways
 
 
-@pytest.mark.parametrize("name", RewardWeights.__slots__)
+@pytest.mark.parametrize("name", REWARD_TERMS)
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_a_weight_that_is_no_finite_number_is_refused(name: str, value: Any) -> None:
     with pytest.raises(ValueError, match=f"reward_weights.{name}: found .*; must be a finite"):

@@ -9,7 +9,7 @@ import numpy as np
 
 from roller_env.arrays import Bool, Float64, Int64
 from roller_env.game import step
-from roller_env.game.rewards import RewardWeights
+from roller_env.game.rewards import RewardMode, RewardWeights
 from roller_env.game.state import GameState
 from roller_env.game.step import Games, Rewarding
 from roller_env.game.tables import LevelTable
@@ -49,7 +49,7 @@ class Rails:
         self,
         *levels: Level,
         step_s: float = 0.05,
-        shaped: bool = False,
+        reward: RewardMode = "points",
         weights: RewardWeights | None = None,
     ):
         """Put one game of each level into one table."""
@@ -69,7 +69,7 @@ class Rails:
         self.bodies = Bodies.of(self.physics, self.at)
         self.bodies.position[:] = self.table.start
         self.bodies.orientation[:, 0] = 1.0
-        self._rewarding = Rewarding(np.array((weights or RewardWeights()).terms), shaped, 1.0)
+        self._rewarding = Rewarding.of(weights or RewardWeights(), reward, 1.0)
         self._every = np.arange(count)
 
     def prepare(self) -> None:

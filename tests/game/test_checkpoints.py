@@ -89,7 +89,7 @@ def test_a_ball_that_came_back_is_pushed_by_nothing() -> None:
 def test_the_way_back_is_paid_back_by_the_shaping() -> None:
     """With a discount of 1 it telescopes over falls too."""
     route = {"points": [resting(), resting(10.0)], "radius": 1.0}
-    rails = Rails(level_of_checkpoints(route=route), shaped=True)
+    rails = Rails(level_of_checkpoints(route=route), reward="shaped")
     for x in (2.0, 5.0, 9.9):
         rails.go(resting(x))
     fall(rails)

@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from roller_env.game.result import REWARD_TERMS
-from roller_env.game.rewards import RewardWeights, shaping
+from roller_env.game.rewards import NEARNESS_M, RewardWeights, shaping
 from roller_env.level import Level
+from roller_env.pieces.coin import COIN
 from tests.builders import Game, coin, make_level, resting
 from tests.game.rails import Rails
 
@@ -31,7 +32,7 @@ class Route:
     """A ball on a route, and its potential: what the simulation does with it in every step."""
 
     def __init__(self, level: Level | None = None):
-        self._rails = Rails(level or route_level(), shaped=True)
+        self._rails = Rails(level or route_level(), reward="shaped")
         self.state = self._rails.state
 
     def potential(self, x: float, y: float) -> float:
@@ -82,7 +83,7 @@ def test_the_finish_and_the_fall_are_paid_by_their_weights() -> None:
 
 
 def test_the_terms_are_added_up_over_an_episode_and_kept_apart() -> None:
-    rails = Rails(make_level(coins=[coin(*resting(1.0)), coin(*resting(9.0))]), shaped=False)
+    rails = Rails(make_level(coins=[coin(*resting(1.0)), coin(*resting(9.0))]))
     total = sum(rails.go(resting(x)).reward[0] for x in (1.0, 5.0, 9.0))
     rails.go((0, 0, -40.0))
     assert rails.state.reward_terms[0].tolist() == [2.0, 0.0, -1.0, 0.0]
@@ -90,7 +91,88 @@ def test_the_terms_are_added_up_over_an_episode_and_kept_apart() -> None:
 
 
 def test_the_terms_are_those_that_have_weights() -> None:
-    assert tuple(field.name for field in fields(RewardWeights)) == REWARD_TERMS
+    names = tuple(field.name for field in fields(RewardWeights))
+    assert names == (*REWARD_TERMS, "completeness")
+
+
+FINISH_AFTER_COINS = {
+    "finish": {"at": (30.0, 0.0, 0.5), "size": (1, 1, 1)},
+    "coins": [coin(*resting(x)) for x in (1.0, 3.0, 5.0, 7.0)],
+}
+
+
+@given(coins=st.integers(0, 4), power=st.floats(0.0, 8.0))
+def test_the_finish_is_worth_the_share_of_the_coins_to_the_power_asked_for(
+    coins: int, power: float
+) -> None:
+    weights = RewardWeights(coin=0.0, finish=40.0, completeness=power)
+    rails = Rails(make_level(**FINISH_AFTER_COINS), weights=weights)
+    for x in (1.0, 3.0, 5.0, 7.0)[:coins]:
+        rails.go(resting(x))
+    rails.go(resting(coins * 2.0 - 1.0, 5.0))
+    rails.go(resting(30.0, 5.0))
+    events = rails.go(resting(30.0))
+    expected = 40.0 * (coins / 4) ** power if power > 0.0 else 40.0
+    assert events.terms[0, 1] == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_finish_of_a_level_without_coins_is_always_paid_in_full() -> None:
+    level = make_level(finish={"at": (3.0, 0.0, 0.5), "size": (1, 1, 1)})
+    rails = Rails(level, weights=RewardWeights(completeness=3.0))
+    assert rails.go(resting(3.0)).terms[0, 1] == RewardWeights().finish
+
+
+@pytest.mark.parametrize("power", [-1.0, 101.0, float("nan")])
+def test_a_completeness_that_is_no_power_is_refused(power: float) -> None:
+    with pytest.raises(ValueError, match=r"reward_weights.completeness: found .* from 0 to 100"):
+        RewardWeights(completeness=power)
+
+
+def nearness_potential(rails: Rails, x: float, y: float) -> float:
+    rails.put(*resting(x, y))
+    rails.wait(rails.step_s)
+    return float(rails.state.shaping.potential[0]) / RewardWeights().progress
+
+
+@given(x=st.floats(-20.0, 20.0), y=st.floats(-20.0, 20.0))
+def test_nearness_is_that_of_the_nearest_coin_left(x: float, y: float) -> None:
+    places = np.array([resting(-9.0, 4.0), resting(3.0, 9.0), resting(3.0, -12.0), resting(14.0)])
+    rails = Rails(make_level(coins=[coin(*place) for place in places]), reward="nearness")
+    found = nearness_potential(rails, x, y)
+    left = places[~rails.state.of(COIN).taken[0]]
+    away = np.linalg.norm(left - resting(x, y), axis=1).min()
+    assert found == pytest.approx(max(1.0 - away / NEARNESS_M, 0.0), abs=1e-12)
+
+
+def test_when_no_coin_is_left_nearness_is_that_of_the_finish() -> None:
+    level = make_level(
+        coins=[coin(*resting(1.0))], finish={"at": (9.0, 0.0, 0.5), "size": (1, 1, 1)}
+    )
+    rails = Rails(level, reward="nearness")
+    rails.go(resting(1.0))
+    finish, ball = np.array([9.0, 0.0, 0.5]), np.array(resting(5.0))
+    away = np.linalg.norm(finish - ball)
+    assert nearness_potential(rails, 5.0, 0.0) == pytest.approx(1.0 - away / NEARNESS_M)
+
+
+def test_nearness_needs_no_route_and_adds_up_to_nothing_but_where_an_episode_begins() -> None:
+    discount, weight = 0.99, 8.0
+    weights = RewardWeights(progress=weight)
+    game = Game(
+        make_level(coins=[coin(*resting(2.0, 1.0)), coin(*resting(4.0, -1.0))]),
+        reward="nearness",
+        discount=discount,
+        reward_weights=weights,
+    )
+    plain = Game(make_level(coins=[coin(*resting(2.0, 1.0)), coin(*resting(4.0, -1.0))]))
+    begin = float(game.simulation.state.shaping.potential[0])
+    total = 0.0
+    for step in range(40):
+        held = "wa" if step % 7 < 3 else "wd"
+        total += discount**step * (game.step(held).reward[0] - plain.step(held).reward[0])
+    end = float(game.simulation.state.shaping.potential[0])
+    assert begin > 0.0
+    assert total == pytest.approx(discount**40 * end - begin, abs=1e-9)
 
 
 def test_standing_still_is_worth_no_points() -> None:
@@ -148,7 +230,7 @@ def test_a_level_without_a_route_has_no_progress() -> None:
 
 def test_a_shorter_routes_padding_is_never_followed() -> None:
     short = make_level(route={"points": [resting(), resting(4.0)], "radius": 1.0})
-    rails = Rails(short, route_level(), make_level(), shaped=True)
+    rails = Rails(short, route_level(), make_level(), reward="shaped")
     for x in (1.0, 4.0, 4.0, 4.0, 4.0):
         rails.put(*resting(x))
         rails.wait(rails.step_s)
