@@ -103,9 +103,8 @@ def test_entries_on_parabolas_are_those_that_dense_sampling_finds(
     entered = np.flatnonzero(depths <= -1e-9)
     if len(entered):
         first = int(entered[0])
-        assert time <= shares[first]
-        if (depths[:first] > 1e-6).all():
-            root = brentq(depth, shares[first - 1], shares[first], xtol=1e-13)
-            assert time == pytest.approx(root, abs=1e-7)
+        # Between two samples it may have touched before; that it did is asked below.
+        if depths[first - 1] > 0.0:
+            assert time <= brentq(depth, shares[first - 1], shares[first], xtol=1e-13) + 1e-7
     if time < np.inf:
         assert depth(time) <= 2e-12

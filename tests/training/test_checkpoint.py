@@ -178,15 +178,23 @@ Edit = Callable[[dict[str, Any], dict[str, npt.NDArray[Any]]], object]
         ),
         (
             lambda facts, arrays: arrays.update(
-                {"environments/games/game/shaping/waypoint": np.full(8, 10**9)}
+                {"environments/games/game/shaping/waypoint": np.full(10, 10**9)}
             ),
             "waypoint: found .*; must be 0 to ",
         ),
         (
             lambda facts, arrays: arrays.update(
-                {"environments/games/level_of_row": np.full(8, -1)}
+                {"environments/games/level_of_row": np.full(10, -1)}
             ),
             "level_of_row: found .*; must be 0 to 0",
+        ),
+        (
+            lambda facts, arrays: arrays.update({"environments/task": np.full(10, 10**6)}),
+            "task: found 1000000; must be -1 to ",
+        ),
+        (
+            lambda facts, arrays: arrays.update({"environments/journeys/coin": np.array([0, 12])}),
+            "coin: found 12; must be -1 to 11",
         ),
         (
             lambda facts, arrays: arrays.update({"optimizer/0/exp_avg": np.zeros(3, np.float32)}),
@@ -194,7 +202,7 @@ Edit = Callable[[dict[str, Any], dict[str, npt.NDArray[Any]]], object]
         ),
         (
             lambda facts, arrays: facts["state"].update({"environments/games/generators": []}),
-            "generators: found 0; wanted 8",
+            "generators: found 0; wanted 10",
         ),
         (
             lambda facts, arrays: facts["state"].update({"environments/level": "{}"}),

@@ -110,8 +110,8 @@ def test_the_explorers_are_hidden_from_the_learner() -> None:
 @pytest.mark.parametrize("action", ["directions", "keys", "force"])
 def test_explorers_find_the_coins_of_a_level_in_every_action_mode(action: str) -> None:
     curriculum = with_curriculum(0.5, explorers=16, physics="rigid", action=action)
-    still = {"directions": np.zeros(ROWS, dtype=np.int64), "keys": np.zeros((ROWS, 4), np.int8)}
-    actions = still.get(action, np.zeros((ROWS, 2), np.float32))
+    space = curriculum.action_space
+    actions = np.zeros((ROWS, *(space.shape or ())), dtype=space.dtype)
     for _ in range(300):
         curriculum.step(actions)
     found = {task // len(LOOKS_BACK) for task in curriculum.snapshot().games}
