@@ -3,9 +3,10 @@
 
 PYTHON ?= python3
 LEVEL  ?= classic
-CONFIG ?= configs/ppo_$(LEVEL).yaml
+# A configuration's file instead of the recipe that comes with Roller.
+CONFIG ?=
 SEED   ?= 0
-# The run's directory in runs/; by default the configuration's name and the seed.
+# The run's directory in runs/; by default the configuration's name, the level's and the seed.
 NAME   ?=
 ARGS   ?=
 
@@ -46,7 +47,7 @@ $(READY): pyproject.toml constraints.txt
 	@echo "$(VENV) is ready."
 
 train: $(READY) ## train, evaluate and draw; goes on with an unfinished run
-	@$(BIN)/python scripts/train.py --config $(CONFIG) --seed $(SEED) --resume \
+	@$(BIN)/python scripts/train.py $(if $(CONFIG),--config $(CONFIG),$(LEVEL)) --seed $(SEED) --resume \
 		$(if $(NAME),--name $(NAME)) $(ARGS)
 
 play: $(READY) ## play in the browser, on this machine's port 8080

@@ -61,7 +61,7 @@ class Arguments:
     training_envs: int = 64
     """Of the PPO on RollerVecEnv and on SubprocVecEnv, which starts as many processes."""
 
-    config: Path = Path("configs/ppo_classic.yaml")
+    config: Path = Path("configs/ppo.yaml")
     """What make train trains."""
 
     peers: str = str(INTERPRETER)

@@ -75,7 +75,7 @@ def test_the_wheel_holds_every_level_and_replay_and_says_that_it_is_typed(wheel:
     assert "roller_env/py.typed" in names
     assert {f"roller_env/assets/levels/{level}.yaml" for level in shipped_levels()} <= names
     assert {f"roller_env/assets/replays/{level}.replay" for level in shipped_replays()} <= names
-    assert {f"roller_env/assets/configs/ppo_{level}.yaml" for level in shipped_levels()} <= names
+    assert "roller_env/assets/configs/ppo.yaml" in names
     assert "roller_env/assets/sounds/coin.wav" in names
     only_here = ("tests/", "scripts/", "configs/", "roller_env/lab/")
     assert not [name for name in names if name.startswith(only_here)]
@@ -108,12 +108,12 @@ def test_the_installed_command_works_in_an_empty_directory(installed: Path, tmp_
     assert run(roller, "level", "check", "mine.yaml", "flat", directory=tmp_path) == ""
     program = (
         "from roller_env.assets import asset_directory as a; from roller_env.replay import *; "
-        "from roller_env.cli.train import config_file; "
-        "print(load_replay(shipped_replays()['flat']).level.name, config_file('gate', None).name, "
+        "from roller_env.cli.train import recipe; "
+        "print(load_replay(shipped_replays()['flat']).level.name, recipe().name, "
         "(a('sounds') / 'coin.wav').stat().st_size > 0)"
     )
     found = run(installed / "python", "-c", program, directory=tmp_path)
-    assert found == "flat ppo_gate.yaml True\n"
+    assert found == "flat ppo.yaml True\n"
 
 
 def test_the_installed_command_trains_a_shipped_configuration(

@@ -21,7 +21,7 @@ from typing import Annotated, Final
 import tyro
 
 from roller_env.assets import asset_directory
-from roller_env.level import LevelError, is_path
+from roller_env.level import LevelError, is_path, shipped_levels
 from roller_env.problems import Problem, listed, printable, quoted, shown
 from roller_env.training import ConfigError, TrainingRun, load_config, train
 from roller_env.training.checkpoint import CheckpointError
@@ -36,15 +36,16 @@ DEFAULT: Final = "classic"
 class Arguments:
     """Train an agent, evaluate it and draw what it does; all of it goes into runs/<name>/."""
 
-    what: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="NAME|FILE")] = None
-    """What to train, and how: a configuration that comes with Roller, such as classic, or a file
-    of your own; by default classic."""
+    what: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="LEVEL|FILE")] = None
+    """A level that comes with Roller, which the recipe that comes with Roller is trained on; or the
+    file of a configuration of your own; by default classic."""
 
     config: Path | None = None
-    """The same, always a file."""
+    """A configuration's file."""
 
     name: str | None = None
-    """The run's; by default the name of the configuration's file and the seed."""
+    """The run's; by default the names of the configuration's file and of the level it was asked
+    for, and the seed."""
 
     seed: int | None = None
     """Instead of the configuration's."""
@@ -77,45 +78,44 @@ def main(argv: Sequence[str] | None = None, prog: str | None = None) -> None:
         sys.exit("\nstopped; --resume goes on from the last checkpoint")
 
 
-def shipped_configs() -> dict[str, Path]:
-    """Return the files of the configurations that come with the package, by level."""
-    files = sorted(asset_directory("configs").glob("*.yaml"))
-    return {path.stem.partition("_")[2]: path for path in files}
+def recipe() -> Path:
+    """Return the file of the configuration that comes with the package."""
+    return asset_directory("configs") / "ppo.yaml"
 
 
-def config_file(what: str | None, config: Path | None) -> Path:
-    """Return the file that the command line asks for.
+def what_to_train(what: str | None, config: Path | None) -> tuple[Path, str | None]:
+    """Return the configuration's file and the level that the command line asks for.
 
     Raises:
-        ConfigError: it asks for two, or for a name that there is not.
+        ConfigError: it asks for two files, or for a level that there is not.
     """
     if config is not None:
         if what is not None:
             message = f"found both {quoted(what)} and --config; give one of the two"
             raise ConfigError([Problem((), message)])
-        return config
+        return config, None
     what = what or DEFAULT
     if is_path(what):
-        return Path(what)
-    shipped = shipped_configs()
-    if what not in shipped:
-        known = tuple(shipped)
-        message = f"no configuration is called {quoted(what)}; there are {listed(known)}"
+        return Path(what), None
+    known = shipped_levels()
+    if what not in known:
+        message = f"no level is called {quoted(what)}; there are {listed(known)}"
         problem = Problem((), f"{message}, and paths end in .yaml", written=what, known=known)
         raise ConfigError([problem])
-    return shipped[what]
+    return recipe(), what
 
 
 def _train(arguments: Arguments) -> None:
-    file = config_file(arguments.what, arguments.config)
+    file, level = what_to_train(arguments.what, arguments.config)
+    asked = () if level is None else (f"level={level}",)
     seed = () if arguments.seed is None else (f"seed={arguments.seed}",)
     demos = () if arguments.demos is None else (f"demonstrations={json.dumps(arguments.demos)}",)
-    config = load_config(file, (*arguments.set, *seed, *demos))
-    default = f"{file.stem}-seed{config.seed}"
+    config = load_config(file, (*asked, *arguments.set, *seed, *demos))
+    default = "_".join((file.stem, *([level] if level else []))) + f"-seed{config.seed}"
     name = default if arguments.name is None else arguments.name
     directory = run_directory(arguments.runs, name)
-    algorithm, level = config.algorithm.upper(), shown(config.level)
-    print(f"Training {algorithm} on {level}, seed {config.seed}: {shown(directory)}")
+    algorithm, played = config.algorithm.upper(), shown(config.level)
+    print(f"Training {algorithm} on {played}, seed {config.seed}: {shown(directory)}")
     print_results(train(config, directory, resume=arguments.resume))
 
 

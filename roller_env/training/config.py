@@ -329,7 +329,7 @@ def load_config(file: str | os.PathLike[str], overrides: Sequence[str] = ()) -> 
     """Read a configuration.
 
     Args:
-        file: YAML, such as ``configs/ppo_classic.yaml``.
+        file: YAML, such as ``configs/ppo.yaml``.
         overrides: ``field=value`` each, a field inside another as ``ppo.gamma=0.995``; values
             are YAML.
 

@@ -47,6 +47,9 @@ _FREE_S: Final = 5.0
 _FREE: Final = 0.3
 """Fraction of the practice that begins where an explorer is, whatever can be done from there."""
 
+_BESIDE_THE_AGENT: Final = 0.5
+"""Fraction of the explorers' journeys that begin where the agent is, in a game from the start."""
+
 _KEPT: Final = 32
 """Games kept for each task; a newer one takes the place of any."""
 
@@ -268,16 +271,28 @@ class StartStateCurriculum(VecEnvWrapper):
             observations[rows] = fresh
 
     def _send_out(self, rows: Int64) -> None:
-        """Put explorers where something was achieved, or at the start, and let them set out."""
+        """Put explorers where the agent is or where something was achieved; let them set out.
+
+        From where the agent is, they find what it could do next in just the games that it plays;
+        what they found in others, it may not recognise in its own.
+        """
         if not len(rows):
             return
-        from_start = self._rng.random(len(rows)) < 1.0 / (1 + len(self._games))
-        if from_start.any():
-            self.environments.simulation.reset(rows[from_start])
-            self._settle(rows[from_start])
-        if not from_start.all():
-            _, games = self._drawn(int((~from_start).sum()))
-            self._put(games, rows[~from_start])
+        simulation, playing = self.environments.simulation, ~self._practises
+        playing[self._explorers.rows] = False
+        beside = (self._rng.random(len(rows)) < _BESIDE_THE_AGENT) | (not self._games)
+        if not playing.any():
+            beside[:] = False
+        games: list[Snapshot] = []
+        if beside.any():
+            agents = np.flatnonzero(playing)
+            drawn = self._rng.integers(len(agents), size=int(beside.sum()))
+            games += separate(simulation.snapshot(agents).take(drawn))
+        if self._games and not beside.all():
+            games += self._drawn(int((~beside).sum()))[1]
+        order = np.concatenate([rows[beside], rows[~beside]])[: len(games)]
+        if len(games):
+            self._put(games, order)
         self._explorers.set_out(rows)
 
     def _drawn(self, count: int) -> tuple[Int64, list[Snapshot]]:

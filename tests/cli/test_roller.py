@@ -10,7 +10,7 @@ import pytest
 
 import roller_env
 from roller_env.cli import COMMANDS, main, replay
-from roller_env.cli.train import config_file, shipped_configs
+from roller_env.cli.train import recipe, what_to_train
 from roller_env.level import shipped_levels
 from roller_env.training import ConfigError, load_config
 
@@ -111,26 +111,26 @@ def test_a_fault_of_our_own_is_not_taken_for_a_missing_package(
         main(["train"])
 
 
-def test_every_shipped_level_can_be_trained_by_its_name() -> None:
-    assert tuple(shipped_configs()) == shipped_levels()
+def test_every_shipped_level_is_trained_by_its_name_with_one_recipe() -> None:
     for name in shipped_levels():
-        assert load_config(config_file(name, None)).level == name
-    assert config_file(None, None) == shipped_configs()["classic"]
+        assert what_to_train(name, None) == (recipe(), name)
+    assert what_to_train(None, None) == (recipe(), "classic")
+    assert load_config(recipe()).level == "classic"
 
 
-def test_a_configuration_is_a_name_or_a_path() -> None:
-    assert config_file("mine.yaml", None) == Path("mine.yaml")
-    assert config_file(None, Path("mine")) == Path("mine")
+def test_what_is_trained_is_a_level_or_a_configuration_of_ones_own() -> None:
+    assert what_to_train("mine.yaml", None) == (Path("mine.yaml"), None)
+    assert what_to_train(None, Path("mine")) == (Path("mine"), None)
     with pytest.raises(ConfigError, match=r"'clasic'; there are .* \(did you mean 'classic'\?\)"):
-        config_file("clasic", None)
+        what_to_train("clasic", None)
     with pytest.raises(ConfigError, match="give one of the two"):
-        config_file("classic", Path("mine.yaml"))
+        what_to_train("classic", Path("mine.yaml"))
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("train clasic", "no configuration is called 'clasic'"),
+        ("train clasic", "no level is called 'clasic'"),
         ("train classic --set total_steps=-1", "total_steps: "),
         ("evaluate nowhere", "nowhere"),
         ("play flat --level classic", "found it twice"),
