@@ -1,0 +1,310 @@
+"""What becomes of trainings: the recipe on seeds that nobody tuned on, and what each part is worth.
+
+A trial is one training of a level with one seed, and its evaluation. Its row is kept as soon as it
+is there, so that an experiment of hours can be stopped and gone on with.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import tempfile
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+import pandas
+from matplotlib.figure import Figure
+
+from roller_env import __version__
+from roller_env.lab import chart
+from roller_env.lab.table import Frame, markdown
+from roller_env.training import load_config
+from roller_env.training.files import RunFiles
+from roller_env.training.logs import STEPS, read_progress
+from roller_env.training.policy import load_policy, save_policy
+from roller_env.training.ppo import learn
+from roller_env.training.run import evaluate_policy
+
+RECIPE: Final = "recipe"
+"""The variant in which nothing is changed."""
+
+LEVELS: Final = ("classic", "bridge", "flat", "gate", "lift")
+
+GOOD: Final = 0.95
+"""Share of the games at the finish, and of the coins, from which on a level counts as learnt."""
+
+FACTORS: Final[Mapping[str, tuple[str, ...]]] = {
+    RECIPE: (),
+    "no practice: every game from the start": ("start_state_curriculum=0",),
+    "practice in a quarter of the games": ("start_state_curriculum=0.25",),
+    "the finish paid in full, whatever is left": ("environment.reward_weights.completeness=0",),
+    "no shaping": ("environment.reward=points",),
+    "shaped along the route instead": (
+        "environment.reward=shaped",
+        "environment.reward_weights.progress=20",
+    ),
+    "gamma 0.99": ("ppo.gamma=0.99",),
+    "4 epochs": ("ppo.epochs=4",),
+    "batches of 2048": ("ppo.batch_size=2048", "ppo.learning_rate=1e-3"),
+    "128 units a layer": ("ppo.hidden_sizes=[128,128]",),
+    "rays seen as well": ("environment.observation=rays",),
+    "20 decisions a second": (
+        "environment.control_dt_s=0.05",
+        "environment.max_episode_steps=1200",
+    ),
+    "entropy worth 0.01": ("ppo.entropy_coefficient=0.01",),
+    "rewards as they are": ("normalise_rewards=false",),
+}
+"""Variants of the recipe by their names, and what each changes: one thing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One training: which variant of the recipe, on which level, with which seed."""
+
+    variant: str
+    level: str
+    seed: int
+
+    @property
+    def key(self) -> tuple[str, str, int]:
+        """What its row is found by."""
+        return self.variant, self.level, self.seed
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """Trials that belong together.
+
+    Attributes:
+        trials: in the order in which they are made.
+        changes: overrides of the recipe for all of them.
+    """
+
+    trials: tuple[Trial, ...]
+    changes: tuple[str, ...] = ()
+
+
+EXPERIMENTS: Final[Mapping[str, Experiment]] = {
+    "seeds": Experiment(
+        tuple(Trial(RECIPE, level, seed) for seed in range(10, 20) for level in LEVELS)
+    ),
+    "factors": Experiment(
+        tuple(
+            Trial(variant, level, seed)
+            for seed in range(5)
+            for level in ("flat", "bridge")
+            for variant in FACTORS
+        ),
+        ("total_steps=1000000",),
+    ),
+}
+
+QUICK: Final = Experiment(
+    (Trial(RECIPE, "flat", 0), Trial("gamma 0.99", "gate", 1)),
+    (
+        "total_steps=2048",
+        "num_envs=16",
+        "ppo.rollout_steps=32",
+        "ppo.epochs=1",
+        "evaluation_episodes=4",
+        "environment.max_episode_steps=100",
+    ),
+)
+"""An experiment of seconds that shows nothing but that it works."""
+
+
+def run(
+    experiment: Experiment,
+    recipe: Path,
+    stem: Path,
+    jobs: int,
+    progress: Callable[[Iterable[Any], int], Iterable[Any]] = lambda rows, _: rows,
+) -> None:
+    """Make the trials of which there is no row yet.
+
+    Args:
+        experiment: what to try.
+        recipe: configuration that its variants change.
+        stem: the rows go into ``stem.csv``, the learning curves into ``stem_curves.csv``.
+        jobs: trainings at a time.
+        progress: wraps the trials as they are done, given their number.
+    """
+    done = {(row["variant"], row["level"], int(row["seed"])) for row in _rows(_results(stem))}
+    missing = [trial for trial in experiment.trials if trial.key not in done]
+    stem.parent.mkdir(parents=True, exist_ok=True)
+    # A process for each: what one leaves behind in PyTorch or Numba is not the next one's.
+    with ProcessPoolExecutor(jobs, get_context("spawn"), max_tasks_per_child=1) as pool:
+        trials = [pool.submit(_tried, trial, experiment.changes, recipe) for trial in missing]
+        for trial in progress(as_completed(trials), len(trials)):
+            row, curve = trial.result()
+            # The curve first: a trial whose row is there is whole.
+            _append(_curves(stem), curve)
+            _append(_results(stem), [row])
+
+
+def _results(stem: Path) -> Path:
+    return stem.with_name(f"{stem.name}.csv")
+
+
+def _curves(stem: Path) -> Path:
+    return stem.with_name(f"{stem.name}_curves.csv")
+
+
+def _rows(file: Path) -> Iterator[dict[str, str]]:
+    if file.exists():
+        with file.open(encoding="utf-8", newline="") as text:
+            yield from csv.DictReader(text)
+
+
+def _append(file: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    is_new = not file.exists()
+    with file.open("a", encoding="utf-8", newline="") as text:
+        writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+        if is_new:
+            writer.writeheader()
+        writer.writerows(rows)
+
+
+def _tried(
+    trial: Trial, changes: Sequence[str], recipe: Path
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Return a trial's row and its learning curve."""
+    own = (f"level={trial.level}", f"seed={trial.seed}", "checkpoint_interval_s=1e9")
+    config = load_config(recipe, (*own, *changes, *FACTORS[trial.variant]))
+    names = {"variant": trial.variant, "level": trial.level, "seed": trial.seed}
+    with tempfile.TemporaryDirectory() as directory:
+        files = RunFiles(Path(directory))
+        start_s, cpu_s = time.monotonic(), time.process_time()
+        model, progress = learn(config, files)
+        wall_s, cpu_s = time.monotonic() - start_s, time.process_time() - cpu_s
+        save_policy(model, config, files)
+        policy = load_policy(files.directory)
+        evaluation = evaluate_policy(policy, config, config.evaluation_episodes)
+        curve = list(_thinned(read_progress(files.progress), evaluation.coins_in_level))
+    results = evaluation.results
+    row = names | {
+        "steps": progress.steps,
+        "finish": round(float(np.mean([result.success for result in results])), 4),
+        "coins": round(float(np.mean([result.score_percent for result in results])) / 100, 4),
+        "falls": round(float(np.mean([result.fall for result in results])), 4),
+        "time_s": round(float(np.mean([result.time_s for result in results])), 2),
+        "train_wall_s": round(wall_s, 1),
+        "train_cpu_s": round(cpu_s, 1),
+        "roller": __version__,
+        "processors": os.cpu_count(),
+    }
+    return row, [names | point for point in curve]
+
+
+_POINTS: Final = 30
+"""Of a learning curve that is kept."""
+
+
+def _thinned(rows: Sequence[Mapping[str, str]], coins: int) -> Iterator[dict[str, Any]]:
+    """Yield means over equal stretches of a training's log, weighted by episodes."""
+    for part in np.array_split(np.arange(len(rows)), min(_POINTS, len(rows))):
+        log = [rows[at] for at in part]
+        weights = np.array([float(row["rollout/episodes"]) for row in log])
+
+        def mean(column: str, log: Any = log, weights: Any = weights) -> float | str:
+            values = np.array([float(row[column]) for row in log])
+            known = weights > 0
+            if not known.any():
+                return ""
+            return round(float(np.average(values[known], weights=weights[known])), 4)
+
+        taken = mean("rollout/coins")
+        yield {
+            "steps": log[-1][STEPS],
+            "finish": mean("rollout/success_rate"),
+            "coins": round(taken / max(coins, 1), 4) if isinstance(taken, float) else "",
+        }
+
+
+# Tables and charts -------------------------------------------------------------------------------
+
+
+def seeds_table(stem: Path) -> str:
+    """Return, as Markdown, what became of the recipe: a row a level."""
+    results = _frame(_results(stem))
+    results["learnt"] = (results.finish >= GOOD) & (results.coins >= GOOD)
+    rows = []
+    for level, own in results.groupby("level", sort=False):
+        rows.append(
+            {
+                "level": level,
+                "learnt": f"{own.learnt.sum()} of {len(own)}",
+                "at the finish, mean": _percent(own.finish.mean()),
+                "worst": _percent(own.finish.min()),
+                "coins, mean": _percent(own.coins.mean()),
+                "worst seed": _percent(own.coins.min()),
+                "time of a game": f"{own.time_s.median():.1f} s",
+                "training": f"{own.train_wall_s.median():.0f} s",
+            }
+        )
+    return markdown(Frame(rows))
+
+
+def each_seed_table(stem: Path) -> str:
+    """Return, as Markdown, the share at the finish and of the coins of every seed."""
+    results = _frame(_results(stem)).sort_values("seed")
+    told = [
+        f"{_percent(row.finish)} / {_percent(row.coins)}" for row in results.itertuples(index=False)
+    ]
+    wide = results.assign(told=told).pivot_table("told", "seed", "level", aggfunc="first")
+    wide = wide[[level for level in LEVELS if level in wide]]
+    return markdown(wide.reset_index().astype(str))
+
+
+def factors_table(stem: Path) -> str:
+    """Return, as Markdown, what each variant of the recipe comes to, means over the seeds."""
+    results = _frame(_results(stem))
+    rows = []
+    for variant in [name for name in FACTORS if name in set(results.variant)]:
+        row: dict[str, Any] = {"variant": variant}
+        for level, own in results[results.variant == variant].groupby("level", sort=True):
+            row[f"{level}: at the finish"] = _percent(own.finish.mean())
+            row[f"{level}: coins"] = _percent(own.coins.mean())
+            row[f"{level}: seeds"] = str(len(own))
+        rows.append(row)
+    return markdown(Frame(rows).fillna("-"))
+
+
+def _frame(file: Path) -> Frame:
+    return pandas.read_csv(file)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.4g} %"
+
+
+@chart.styled
+def draw_curves(stem: Path, title: str, note: str) -> Figure:
+    """Draw how coins and finishes grow with the steps, a panel a level, over all seeds."""
+    curves = _frame(_curves(stem))
+    levels = [level for level in LEVELS if level in set(curves.level)]
+    figure, panels = chart.grid(
+        (1, len(levels)), title, note, panel=(2.5, 2.3), margins=(0.7, 0.3, 0.9, 0.8), sharey=True
+    )
+    shares = (("coins", "coins", chart.SERIES[2]), ("finish", "at the finish", chart.SERIES[0]))
+    for axes, level in zip(panels[0], levels, strict=True):
+        own = curves[curves.level == level]
+        for column, label, colour in shares:
+            # Where no whole game ended in a stretch, the one before still stands.
+            wide = own.pivot_table(column, "steps", "seed", dropna=False).ffill()
+            steps = wide.index.to_numpy() / 1e6
+            axes.fill_between(steps, wide.min(axis=1), wide.max(axis=1), color=colour, alpha=0.18)
+            axes.plot(steps, wide.median(axis=1), color=colour, lw=2, label=label)
+        axes.axhline(GOOD, color="#555555", lw=0.8, ls="--")
+        axes.set(ylim=(-0.03, 1.03), xlim=(0, None), xlabel="million steps")
+        axes.set_title(level, fontsize=10, loc="left")
+    panels[0, 0].set_yticks([0, 0.5, 1.0], ["0", "50 %", "100 %"])
+    chart.legend_of(figure, panels[0, 0])
+    return figure
