@@ -35,8 +35,9 @@ class RewardWeights:
         fall: for falling below the kill height.
         progress: potential of a completed route for the ``shaped`` reward, of being at the next
             thing to do for ``nearness``.
-        completeness: power, 0 or more, of the share of the level's coins that are collected, by
-            which the finish is multiplied. 0 pays it in full, whatever was left lying.
+        completeness: what leaving coins costs at the finish, 0 or more: it is paid
+            ``finish * (1 - completeness * share of the coins left)``. With 0 it is paid in full,
+            with 1 by the share collected, with 4 it costs who has left more than a quarter.
     """
 
     coin: float = 1.0
@@ -46,7 +47,7 @@ class RewardWeights:
     completeness: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no finite number, and a power below 0."""
+        """Refuse what is no finite number, and a completeness below 0."""
         asked: dict[str, Callable[[], Any]] = {
             name: partial(checks.number, f"reward_weights.{name}", getattr(self, name))
             for name in REWARD_TERMS

@@ -93,7 +93,7 @@ class Rewarding(NamedTuple):
 
     Attributes:
         weights: (terms,) by `roller_env.game.result.REWARD_TERMS`.
-        completeness: power of the share of coins that the finish is multiplied by.
+        completeness: how much less the finish is worth for each coin left.
         potential: what progress is measured by, if it pays: `POINTS`, `ROUTE` or `NEARNESS`.
         discount: of the shaping.
     """
@@ -445,8 +445,8 @@ def _pay(
     terms[_COIN] = weights[_COIN] * games.step.coins[env, 0]
     terms[_FINISH] = weights[_FINISH] * (counts and state.finished[env])
     if rewarding.completeness > 0.0 and games.tables[_COINS].total[level] > 0:
-        collected = state.kinds[_COINS].collected[env] / games.tables[_COINS].total[level]
-        terms[_FINISH] *= collected**rewarding.completeness
+        left = 1.0 - state.kinds[_COINS].collected[env] / games.tables[_COINS].total[level]
+        terms[_FINISH] *= 1.0 - rewarding.completeness * left
     terms[_FALL] = weights[_FALL] * games.step.fell[env]
     total = terms[_COIN] + terms[_FINISH] + terms[_FALL]
     if rewarding.potential != POINTS:

@@ -101,19 +101,19 @@ FINISH_AFTER_COINS = {
 }
 
 
-@given(coins=st.integers(0, 4), power=st.floats(0.0, 8.0))
-def test_the_finish_is_worth_the_share_of_the_coins_to_the_power_asked_for(
-    coins: int, power: float
+@given(coins=st.integers(0, 4), completeness=st.floats(0.0, 8.0))
+def test_the_finish_is_worth_less_for_the_coins_left_and_may_cost(
+    coins: int, completeness: float
 ) -> None:
-    weights = RewardWeights(coin=0.0, finish=40.0, completeness=power)
+    weights = RewardWeights(coin=0.0, finish=40.0, completeness=completeness)
     rails = Rails(make_level(**FINISH_AFTER_COINS), weights=weights)
     for x in (1.0, 3.0, 5.0, 7.0)[:coins]:
         rails.go(resting(x))
     rails.go(resting(coins * 2.0 - 1.0, 5.0))
     rails.go(resting(30.0, 5.0))
     events = rails.go(resting(30.0))
-    expected = 40.0 * (coins / 4) ** power if power > 0.0 else 40.0
-    assert events.terms[0, 1] == pytest.approx(expected, rel=1e-12)
+    expected = 40.0 * (1.0 - completeness * (4 - coins) / 4)
+    assert events.terms[0, 1] == pytest.approx(expected, abs=1e-9)
 
 
 def test_the_finish_of_a_level_without_coins_is_always_paid_in_full() -> None:
@@ -122,10 +122,10 @@ def test_the_finish_of_a_level_without_coins_is_always_paid_in_full() -> None:
     assert rails.go(resting(3.0)).terms[0, 1] == RewardWeights().finish
 
 
-@pytest.mark.parametrize("power", [-1.0, 101.0, float("nan")])
-def test_a_completeness_that_is_no_power_is_refused(power: float) -> None:
+@pytest.mark.parametrize("completeness", [-1.0, 101.0, float("nan")])
+def test_a_completeness_that_would_pay_for_coins_left_is_refused(completeness: float) -> None:
     with pytest.raises(ValueError, match=r"reward_weights.completeness: found .* from 0 to 100"):
-        RewardWeights(completeness=power)
+        RewardWeights(completeness=completeness)
 
 
 def nearness_potential(rails: Rails, x: float, y: float) -> float:
