@@ -21,8 +21,10 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from roller_env.arrays import Bool, Float64, Int64
+from roller_env.envs.infos import TERMS
 from roller_env.envs.sb3 import TRUNCATED, RollerVecEnv, VecSnapshot
 from roller_env.envs.spaces import shape_observation
+from roller_env.game.result import REWARD_TERMS
 from roller_env.game.state import GameState
 from roller_env.simulation import Snapshot
 from roller_env.training.exploration import Explorers, Journeys
@@ -43,6 +45,11 @@ _GRACE_S: Final = 2.0
 
 _FREE_S: Final = 5.0
 """A game without a goal, taken over from an explorer, is practised this long."""
+
+_STALL_S: Final = 10.0
+"""A game from the start in which nothing was achieved for so long is over, as after a fall. An
+agent that stands still between two coins would else see nothing else for the rest of a minute, and
+think well of it."""
 
 _FREE: Final = 0.3
 """Fraction of the practice that begins where an explorer is, whatever can be done from there."""
@@ -75,6 +82,7 @@ class CurriculumSnapshot:
         games: those kept, by task.
         success: (tasks,) rate of success, 0 to 1.
         age: (rows,) steps since a game began or was put there.
+        idle: (rows,) steps since something was achieved, or a game began.
         task: (rows,) what a row is practising; -1 for nothing.
         from_start: (rows,) whether a game began at the start.
         clock: steps since the last tick.
@@ -87,6 +95,7 @@ class CurriculumSnapshot:
     games: dict[int, list[Snapshot]]
     success: Float64
     age: Int64
+    idle: Int64
     task: Int64
     from_start: Bool
     clock: int
@@ -98,9 +107,9 @@ class StartStateCurriculum(VecEnvWrapper):
     """Lets the first rows practise and the rest play from the start; hides the explorers' rows.
 
     A task is a goal, one of `GameState.achieved` or the finish, and how far back its games begin;
-    its number is ``goal * len(LOOKS_BACK) + look``. Practice is cut short when it takes too long.
-    The level's own time limit is, to the learner, an end like others: the observation shows the
-    time that is left (Pardo et al. 2018).
+    its number is ``goal * len(LOOKS_BACK) + look``. Practice is cut short when it takes too long,
+    and a game from the start ends when it stalls. The level's own time limit is, to the learner, an
+    end like others: the observation shows the time that is left (Pardo et al. 2018).
     """
 
     def __init__(
@@ -120,7 +129,9 @@ class StartStateCurriculum(VecEnvWrapper):
         self._rng = np.random.default_rng(seed)
         simulation = environments.simulation
         self._explorers = Explorers(simulation, explorers, self._rng)
-        self._practises = np.arange(environments.num_envs) < round(fraction * self.num_envs)
+        rows, practise = np.arange(environments.num_envs), round(fraction * self.num_envs)
+        self._practises = rows < practise
+        self._plays = (rows >= practise) & (rows < self.num_envs)
         self._shows_time = simulation.config.observation != "pixels"
         self._goals = simulation.state.achieved.shape[1] + 1
         self._tick = max(round(TICK_S / simulation.config.control_dt_s), 1)
@@ -137,6 +148,7 @@ class StartStateCurriculum(VecEnvWrapper):
         rows = self.environments.num_envs
         self._recent: tuple[Snapshot, ...] = ()
         self._age = np.zeros(rows, dtype=np.int64)
+        self._idle = np.zeros(rows, dtype=np.int64)
         self._task = np.full(rows, _NONE)
         self._from_start = np.ones(rows, dtype=bool)
         self._clock = 0
@@ -182,20 +194,18 @@ class StartStateCurriculum(VecEnvWrapper):
         self._age += 1
         self._clock += 1
         self._keep(news)
-        tired = self._practises & ~self._from_start & ~dones & (self._age >= self._limits())
-        for row in np.flatnonzero(tired).tolist():
-            shown = observations
-            infos[row]["terminal_observation"] = (
-                {name: values[row].copy() for name, values in shown.items()}
-                if isinstance(shown, dict)
-                else shown[row].copy()
-            )
-            infos[row][TRUNCATED], infos[row][FROM_START] = True, False
+        self._idle += 1
+        self._idle[news.any(axis=1)] = 0
+        practising = self._practises & ~self._from_start
+        tired = practising & ~dones & (self._age >= self._limits())
+        stalled = self._plays & ~dones & (self._idle >= self._steps(_STALL_S))
+        self._tell(np.flatnonzero(tired | stalled), observations, infos)
         self._judge(done_now, dones | tired)
-        dones |= tired
-        self._age[dones] = 0
+        dones |= tired | stalled
+        self._age[dones] = self._idle[dones] = 0
         self._from_start[dones] = True
         self._achieved = state.achieved
+        self._begin_again(np.flatnonzero(stalled), observations)
         self._begin(np.flatnonzero(dones & self._practises), observations)
         self._explorers.journeys.left[dones[self._explorers.rows]] = 0
         self._send_out(self._explorers.arrived())
@@ -203,6 +213,24 @@ class StartStateCurriculum(VecEnvWrapper):
             self._clock = 0
             latest = self.environments.simulation.snapshot()
             self._recent = (latest, *self._recent)[: LOOKS_BACK[-1]]
+
+    def _tell(self, rows: Int64, observations: Any, infos: Sequence[dict[str, Any]]) -> None:
+        """Write into infos what is told of games that are cut short where they are."""
+        state = self.environments.simulation.state
+        for row in rows.tolist():
+            last = (
+                {name: values[row].copy() for name, values in observations.items()}
+                if isinstance(observations, dict)
+                else observations[row].copy()
+            )
+            told: dict[str, Any] = {
+                "terminal_observation": last,
+                "episode": {"r": float(state.total_reward[row]), "l": int(state.steps[row])},
+                TERMS: dict(zip(REWARD_TERMS, state.reward_terms[row].tolist(), strict=True)),
+                TRUNCATED: not self._plays[row],
+                FROM_START: bool(self._from_start[row]),
+            }
+            infos[row].update(told)
 
     def _limits(self) -> Int64:
         """Return after how many steps each row has practised enough, (rows,)."""
@@ -245,6 +273,14 @@ class StartStateCurriculum(VecEnvWrapper):
         self._task[rows[over[rows]]] = _NONE
         self._task[rows[succeeded]] = _NONE
 
+    def _begin_again(self, rows: Int64, observations: Any) -> None:
+        """Begin at the start in rows whose games are cut short."""
+        if len(rows):
+            simulation = self.environments.simulation
+            simulation.reset(rows)
+            self._put(separate(simulation.snapshot(rows)), rows)
+            self._show(rows, observations)
+
     def _begin(self, rows: Int64, observations: Any) -> None:
         """Put kept games and explorers' games into rows, and what they show where it belongs."""
         if not len(rows) or not self._games:
@@ -263,6 +299,10 @@ class StartStateCurriculum(VecEnvWrapper):
             games += separate(simulation.snapshot(explored).take(drawn))
         self._put(games, np.concatenate([rows[~free], rows[free]]))
         self._from_start[rows] = False
+        self._show(rows, observations)
+
+    def _show(self, rows: Int64, observations: Any) -> None:
+        simulation = self.environments.simulation
         fresh = shape_observation(simulation.config, simulation.observe(rows))
         if isinstance(observations, dict):
             for name, values in observations.items():
@@ -278,14 +318,11 @@ class StartStateCurriculum(VecEnvWrapper):
         """
         if not len(rows):
             return
-        simulation, playing = self.environments.simulation, ~self._practises
-        playing[self._explorers.rows] = False
+        simulation, agents = self.environments.simulation, np.flatnonzero(self._plays)
         beside = (self._rng.random(len(rows)) < _BESIDE_THE_AGENT) | (not self._games)
-        if not playing.any():
-            beside[:] = False
+        beside &= len(agents) > 0
         games: list[Snapshot] = []
         if beside.any():
-            agents = np.flatnonzero(playing)
             drawn = self._rng.integers(len(agents), size=int(beside.sum()))
             games += separate(simulation.snapshot(agents).take(drawn))
         if self._games and not beside.all():
@@ -312,7 +349,7 @@ class StartStateCurriculum(VecEnvWrapper):
         self._settle(rows)
 
     def _settle(self, rows: Int64) -> None:
-        self._age[rows] = 0
+        self._age[rows] = self._idle[rows] = 0
         self._achieved[rows] = self.environments.simulation.state.achieved[rows]
 
     def snapshot(self) -> CurriculumSnapshot:
@@ -323,6 +360,7 @@ class StartStateCurriculum(VecEnvWrapper):
             games={task: list(games) for task, games in self._games.items()},
             success=self._success.copy(),
             age=self._age.copy(),
+            idle=self._idle.copy(),
             task=self._task.copy(),
             from_start=self._from_start.copy(),
             clock=self._clock,
@@ -337,6 +375,7 @@ class StartStateCurriculum(VecEnvWrapper):
         self._games = {task: list(games) for task, games in snapshot.games.items()}
         self._success = snapshot.success.copy()
         self._age = snapshot.age.copy()
+        self._idle = snapshot.idle.copy()
         self._task = snapshot.task.copy()
         self._from_start = snapshot.from_start.copy()
         self._clock = snapshot.clock

@@ -8,6 +8,7 @@ import pytest
 
 from roller_env.lab import trainings
 from roller_env.lab.chart import save
+from roller_env.training import load_config
 
 RECIPE = Path(__file__).parents[2] / "configs" / "ppo.yaml"
 
@@ -58,7 +59,7 @@ def test_a_level_is_learnt_where_finish_and_coins_are_both_good(tmp_path: Path) 
 
 
 def test_every_factor_changes_the_recipe_and_is_a_configuration() -> None:
-    recipe = trainings.load_config(RECIPE)
+    recipe = load_config(RECIPE)
     for variant, changes in trainings.FACTORS.items():
-        changed = trainings.load_config(RECIPE, changes)
+        changed = load_config(RECIPE, changes)
         assert (changed == recipe) == (variant == trainings.RECIPE), variant

@@ -93,6 +93,18 @@ def test_practice_that_takes_too_long_is_cut_off_and_told_as_such() -> None:
         assert not info[FROM_START]
 
 
+def test_a_game_from_the_start_that_stalls_is_over_for_good() -> None:
+    curriculum = with_curriculum(0.5, max_episode_steps=400)
+    ended = []
+    for _ in range(100):
+        _, _, dones, infos = curriculum.step(np.zeros(ROWS, dtype=np.int64))
+        ended += [infos[row] for row in np.flatnonzero(dones).tolist()]
+    assert [info["episode"]["l"] for info in ended] == [100] * (ROWS // 2)
+    assert not any(info[TRUNCATED] or info["success"] for info in ended)
+    steps = curriculum.environments.simulation.state.steps[ROWS // 2 : ROWS]
+    assert steps.tolist() == [0] * (ROWS // 2)
+
+
 def test_the_time_limit_ends_a_game_for_good_since_the_agent_sees_it_coming() -> None:
     curriculum = with_curriculum(0.0, explorers=0, max_episode_steps=10)
     ended = played(curriculum, 10)
