@@ -92,7 +92,8 @@ class PPOConfig(_Frozen):
         gamma: discount of one step.
         gae_lambda: of generalised advantage estimation.
         clip_range: of the probability ratio.
-        entropy_coefficient: weight of the entropy bonus.
+        entropy_coefficient: weight of the entropy bonus, at the start.
+        entropy_decay: ``linear`` goes to 0 at the last step of the training.
         value_coefficient: weight of the value loss.
         max_grad_norm: gradients are clipped to this norm.
         target_kl: an update ends early past 1.5 times this divergence; None never does.
@@ -109,6 +110,7 @@ class PPOConfig(_Frozen):
     gae_lambda: Fraction = 0.95
     clip_range: PositiveFloat = 0.2
     entropy_coefficient: NonNegativeFloat = 0.01
+    entropy_decay: Literal["constant", "linear"] = "constant"
     value_coefficient: NonNegativeFloat = 0.5
     max_grad_norm: PositiveFloat = 0.5
     target_kl: PositiveFloat | None = None

@@ -177,6 +177,11 @@ class _Recorder(BaseCallback):
         self._between_updates()
         if is_complete(self._config, self.progress):
             raise _BudgetSpent
+        ppo = self._config.ppo
+        if ppo.entropy_decay == "linear":
+            assert isinstance(self.model, PPO)
+            left = 1.0 - self.progress.steps / self._config.total_steps
+            self.model.ent_coef = ppo.entropy_coefficient * left
 
     def _on_training_end(self) -> None:
         self._between_updates()
