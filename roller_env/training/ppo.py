@@ -216,7 +216,9 @@ class _Recorder(BaseCallback):
 def _achieved(statistics: dict[str, float]) -> str:
     if not statistics["rollout/episodes"]:
         return "no episode ended yet"
+    terms = ", ".join(f"{term} {statistics[f'reward/{term}']:.0f}" for term in REWARD_TERMS)
     return (
         f"finish {statistics['rollout/success_rate']:.0%}, "
-        f"coins {statistics['rollout/coins']:.1f}, falls {statistics['rollout/fall_rate']:.0%}"
+        f"coins {statistics['rollout/coins']:.1f}, falls {statistics['rollout/fall_rate']:.0%}; "
+        f"reward {statistics['rollout/ep_rew_mean']:.0f} ({terms})"
     )

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+from collections import Counter
 from dataclasses import asdict
 from typing import Any, Final
 
@@ -83,6 +84,31 @@ def markdown_table(evaluation: Evaluation, config: TrainingConfig) -> str:
             continue
         mean, low, high = (unit.format(x) for x in (value.mean, value.low, value.high))
         lines.append(f"| {name} | {mean} | {low} to {high} |")
+    return "\n".join(lines) + "\n"
+
+
+GOOD: Final = 0.95
+"""Share of the games at the finish, and of the coins, under which an agent fell short."""
+
+
+def advice(evaluation: Evaluation, config: TrainingConfig) -> str:
+    """Return where the agent fell short of `GOOD` and what to try, or nothing if nowhere."""
+    results = evaluation.results
+    finished = sum(result.success for result in results) / len(results)
+    coins = sum(result.score_percent for result in results) / len(results) / 100.0
+    if finished >= GOOD and coins >= GOOD:
+        return ""
+    ends = Counter(result.outcome for result in results if not result.success)
+    lines = [f"It fell short: {finished:.0%} at the finish, {coins:.0%} of the coins. Try"]
+    lines += [
+        f"- twice the steps: --set total_steps={2 * config.total_steps}; another --seed",
+    ]
+    if ends["fall"] > ends["time limit"]:
+        lines.append("- a fall that costs more: --set environment.reward_weights.fall=-10")
+    elif ends["time limit"]:
+        lines.append("- more exploration: --set ppo.entropy_coefficient=0.01 (it stood still)")
+    if finished >= GOOD:
+        lines.append("- coins left that cost more: --set environment.reward_weights.completeness=8")
     return "\n".join(lines) + "\n"
 
 

@@ -34,7 +34,12 @@ from roller_env.training.files import (
 from roller_env.training.pictures import draw_paths, film_episode
 from roller_env.training.policy import Policy, load_policy, save_policy
 from roller_env.training.ppo import learn
-from roller_env.training.report import draw_learning_curve, markdown_table, write_evaluation
+from roller_env.training.report import (
+    advice,
+    draw_learning_curve,
+    markdown_table,
+    write_evaluation,
+)
 
 EVALUATION_SEED_OFFSET: Final = 1_000_000
 """Added to a training's seed, so that an agent is judged on starts it was not trained on."""
@@ -126,7 +131,7 @@ def _train(
     player = player_of(files.directory)
     evaluation = evaluate_policy(policy, config, config.evaluation_episodes, player=player)
     write_evaluation(evaluation, config, files)
-    print(markdown_table(evaluation, config), flush=True)
+    print(markdown_table(evaluation, config) + advice(evaluation, config), flush=True)
     draw_learning_curve(config, evaluation.coins_in_level, files)
     draw_paths(evaluation, files.paths)
     film_episode(evaluation, files.video)
