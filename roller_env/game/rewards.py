@@ -20,7 +20,7 @@ RewardMode = Literal["points", "shaped", "nearness"]
 POINTS, ROUTE, NEARNESS = range(3)
 """What the potential of each `RewardMode` is of, in their order."""
 
-NEARNESS_M: Final = 6.0
+NEARNESS_M: Final = 4.0
 """Distance from which on what is left to do draws the ball nearer."""
 
 
