@@ -17,7 +17,7 @@ import pytest
 import torch
 
 from roller_env.drawing.opengl import missing_opengl
-from roller_env.level import LevelError
+from roller_env.level import LevelError, load_level
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.demonstrations import DemonstrationError
 from roller_env.training.files import RunError, RunFiles, run_directory
@@ -146,6 +146,33 @@ def test_a_little_training_on_the_flat_level_finds_the_way_and_leaves_every_file
     assert run.summary["steps_per_s"] > 0
     if missing_opengl() is None:
         assert b"ftyp" in files.video.read_bytes()[:16]
+
+
+def recipe(**changes: Any) -> TrainingConfig:
+    """Return the shipped recipe with other values."""
+    overrides = [f"{name.replace('__', '.')}={value}" for name, value in changes.items()]
+    return load_config(ROOT / "configs" / "ppo.yaml", overrides)
+
+
+def test_the_recipe_finds_most_coins_of_the_flat_level_on_a_tiny_budget(tmp_path: Path) -> None:
+    config = recipe(level="flat", num_envs=64, total_steps=250_000, seed=1)
+    model, _ = learn(config, RunFiles(tmp_path))
+    evaluation = evaluate_policy(TrainedPolicy.of(model, config), config, 20)
+    assert evaluation.table()["score (%)"].mean > 50.0
+
+
+def test_the_recipe_learns_a_level_without_a_route_to_the_same_bits(tmp_path: Path) -> None:
+    without = tmp_path / "without.yaml"
+    fields = load_level("gate").model_dump(mode="json", exclude_defaults=True)
+    del fields["route"]
+    without.write_text(json.dumps(fields), encoding="utf-8")
+    small = {"num_envs": 32, "total_steps": 32 * 32 * 12}
+    networks = [
+        learn(recipe(level=level, **small), RunFiles(tmp_path / name))[0].policy.state_dict()
+        for name, level in (("with", "gate"), ("without", without))
+    ]
+    for name, weights in networks[0].items():
+        assert torch.equal(networks[1][name], weights), name
 
 
 def test_a_run_is_not_overwritten_by_another(tmp_path: Path) -> None:
