@@ -300,7 +300,8 @@ def _curriculum(tree: Tree, own: CurriculumSnapshot) -> CurriculumSnapshot:
     kept_for, tasks = np.array(tree["kept_for"], dtype=np.int64), len(own.success)
     _check_numbers("kept_for", kept_for, 0, tasks)
     _check_numbers("task", tree["task"], -1, tasks)
-    _check_numbers("coin", tree["journeys"]["coin"], -1, games.game.of(COIN).taken.shape[1])
+    coins = games.game.of(COIN).taken.shape[1]
+    _check_numbers("aim", tree["journeys"]["aim"], -1, coins + 1)
     _check_numbers("direction", tree["journeys"]["direction"], 0, len(DIRECTIONS))
     kept: dict[int, list[Snapshot]] = {}
     if len(kept_for):

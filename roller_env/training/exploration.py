@@ -11,11 +11,12 @@ import numpy.typing as npt
 from roller_env.arrays import Int64
 from roller_env.game.actions import DIRECTIONS, action_of_keys
 from roller_env.pieces.coin import COIN
+from roller_env.pieces.finish import FINISH
 from roller_env.replay.scripted import steering
 from roller_env.simulation import Simulation
 
 _HOLD_S: Final = 1.0
-"""Longest time for which a direction is held; a coin is headed for up to twice as long."""
+"""Longest time for which a direction is held; a place is headed for up to twice as long."""
 
 _JOURNEY_S: Final = 4.0
 """Longest time after which an explorer is put elsewhere."""
@@ -32,13 +33,14 @@ class Journeys:
 
     Attributes:
         direction: (E,) index of `DIRECTIONS` that is held.
-        coin: (E,) number of the coin that is headed for instead; -1 for none.
+        aim: (E,) number of the coin that is headed for instead, as many as there are coins for
+            the finish, -1 for nothing.
         hold: (E,) steps until something else is done.
         left: (E,) steps until the journey ends.
     """
 
     direction: Int64
-    coin: Int64
+    aim: Int64
     hold: Int64
     left: Int64
 
@@ -48,7 +50,7 @@ class Journeys:
 
 
 class Explorers:
-    """Plays the last rows of a simulation: holds any direction for a while, or heads for a coin.
+    """Plays the last rows of a simulation: holds any direction, or heads for a coin or the finish.
 
     Random keys alone hardly ever hit a coin beside the way: one two metres off is passed within
     reach by one journey in sixty.
@@ -81,10 +83,10 @@ class Explorers:
         journeys.hold[:] -= 1
         journeys.left[:] -= 1
         directions = journeys.direction.copy()
-        heading = np.flatnonzero(journeys.coin != _NOWHERE)
+        heading = np.flatnonzero(journeys.aim != _NOWHERE)
         if len(heading):
             rows, simulation = self.rows[heading], self._simulation
-            way = self._coins()[journeys.coin[heading]] - simulation.ball_position[rows]
+            way = self._places()[journeys.aim[heading]] - simulation.ball_position[rows]
             velocity = simulation.ball_velocity[rows]
             mass_kg = simulation.level.ball.mass_kg
             directions[heading] = steering(way[:, :2], velocity[:, :2], mass_kg)
@@ -95,23 +97,26 @@ class Explorers:
         """Let some of the explorers do something else from now on."""
         journeys, rng = self.journeys, self._rng
         journeys.direction[which] = rng.integers(len(DIRECTIONS), size=len(which))
-        journeys.coin[which] = _NOWHERE
+        journeys.aim[which] = _NOWHERE
         journeys.hold[which] = self._lengths(_HOLD_S, len(which))
         taken = self._simulation.state.of(COIN).taken
         for explorer in which[rng.random(len(which)) < 0.5]:
             row = self.rows[explorer]
             left = np.flatnonzero(~taken[row])
-            if len(left):
-                away = np.linalg.norm(
-                    self._coins()[left] - self._simulation.ball_position[row], axis=1
-                )
-                near = left[np.argsort(away, kind="stable")[:_NEAR]]
-                journeys.coin[explorer] = near[rng.integers(len(near))]
-                journeys.hold[explorer] *= 2
+            away = np.linalg.norm(
+                self._places()[left] - self._simulation.ball_position[row], axis=1
+            )
+            near = left[np.argsort(away, kind="stable")[:_NEAR]]
+            # The place behind the coins' is the finish.
+            aims = np.append(near, taken.shape[1])
+            journeys.aim[explorer] = aims[rng.integers(len(aims))]
+            journeys.hold[explorer] *= 2
 
-    def _coins(self) -> npt.NDArray[np.float64]:
-        places: npt.NDArray[np.float64] = self._simulation.table.of(COIN).at[0]
-        return places
+    def _places(self) -> npt.NDArray[np.float64]:
+        """Return where the coins are, and behind them the finish, (K + 1, 3) metres."""
+        table = self._simulation.table
+        finish = table.regions.centre[0, table.own(FINISH).region]
+        return np.vstack([table.of(COIN).at[0], finish])
 
     def _lengths(self, longest_s: float, count: int) -> Int64:
         """Return random numbers of steps, up to those in ``longest_s``."""

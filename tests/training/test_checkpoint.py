@@ -193,8 +193,8 @@ Edit = Callable[[dict[str, Any], dict[str, npt.NDArray[Any]]], object]
             "task: found 1000000; must be -1 to ",
         ),
         (
-            lambda facts, arrays: arrays.update({"environments/journeys/coin": np.array([0, 12])}),
-            "coin: found 12; must be -1 to 11",
+            lambda facts, arrays: arrays.update({"environments/journeys/aim": np.array([0, 13])}),
+            "aim: found 13; must be -1 to 12",
         ),
         (
             lambda facts, arrays: arrays.update({"optimizer/0/exp_avg": np.zeros(3, np.float32)}),
