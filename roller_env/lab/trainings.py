@@ -58,7 +58,7 @@ FACTORS: Final[Mapping[str, tuple[str, ...]]] = {
         "environment.control_dt_s=0.05",
         "environment.max_episode_steps=1200",
     ),
-    "entropy worth 0.01": ("ppo.entropy_coefficient=0.01",),
+    "no entropy penalty at the end": ("ppo.final_entropy_coefficient=0.0",),
     "rewards as they are": ("normalise_rewards=false",),
 }
 """Variants of the recipe by their names, and what each changes: one thing."""
@@ -93,7 +93,7 @@ class Experiment:
 
 EXPERIMENTS: Final[Mapping[str, Experiment]] = {
     "seeds": Experiment(
-        tuple(Trial(RECIPE, level, seed) for seed in range(20, 30) for level in LEVELS)
+        tuple(Trial(RECIPE, level, seed) for seed in range(30, 40) for level in LEVELS)
     ),
     "factors": Experiment(
         tuple(

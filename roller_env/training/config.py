@@ -93,7 +93,9 @@ class PPOConfig(_Frozen):
         gae_lambda: of generalised advantage estimation.
         clip_range: of the probability ratio.
         entropy_coefficient: weight of the entropy bonus, at the start.
-        entropy_decay: ``linear`` goes to 0 at the last step of the training.
+        final_entropy_coefficient: that at the last step, to which it goes linearly; None: the same
+            throughout. Below 0 it makes the policy sure of itself, so that the likeliest actions,
+            by which it is judged, are those by which it was trained.
         value_coefficient: weight of the value loss.
         max_grad_norm: gradients are clipped to this norm.
         target_kl: an update ends early past 1.5 times this divergence; None never does.
@@ -110,7 +112,7 @@ class PPOConfig(_Frozen):
     gae_lambda: Fraction = 0.95
     clip_range: PositiveFloat = 0.2
     entropy_coefficient: NonNegativeFloat = 0.01
-    entropy_decay: Literal["constant", "linear"] = "constant"
+    final_entropy_coefficient: Annotated[float, Field(allow_inf_nan=False)] | None = None
     value_coefficient: NonNegativeFloat = 0.5
     max_grad_norm: PositiveFloat = 0.5
     target_kl: PositiveFloat | None = None

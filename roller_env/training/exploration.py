@@ -18,7 +18,7 @@ from roller_env.simulation import Simulation
 _HOLD_S: Final = 1.0
 """Longest time for which a direction is held; a place is headed for up to twice as long."""
 
-_JOURNEY_S: Final = 4.0
+_JOURNEY_S: Final = 8.0
 """Longest time after which an explorer is put elsewhere."""
 
 _NEAR: Final = 4

@@ -177,11 +177,14 @@ class _Recorder(BaseCallback):
         self._between_updates()
         if is_complete(self._config, self.progress):
             raise _BudgetSpent
-        ppo = self._config.ppo
-        if ppo.entropy_decay == "linear":
+        begin, end = (
+            self._config.ppo.entropy_coefficient,
+            self._config.ppo.final_entropy_coefficient,
+        )
+        if end is not None:
             assert isinstance(self.model, PPO)
-            left = 1.0 - self.progress.steps / self._config.total_steps
-            self.model.ent_coef = ppo.entropy_coefficient * left
+            done = self.progress.steps / self._config.total_steps
+            self.model.ent_coef = begin + (end - begin) * done
 
     def _on_training_end(self) -> None:
         self._between_updates()
