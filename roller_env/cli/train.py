@@ -111,7 +111,8 @@ def _train(arguments: Arguments) -> None:
     seed = () if arguments.seed is None else (f"seed={arguments.seed}",)
     demos = () if arguments.demos is None else (f"demonstrations={json.dumps(arguments.demos)}",)
     config = load_config(file, (*asked, *arguments.set, *seed, *demos))
-    default = "_".join((file.stem, *([level] if level else []))) + f"-seed{config.seed}"
+    parts = (file.stem,) if level is None else (file.stem, Path(config.level).stem)
+    default = f"{'_'.join(parts)}-seed{config.seed}"
     name = default if arguments.name is None else arguments.name
     directory = run_directory(arguments.runs, name)
     algorithm, played = config.algorithm.upper(), shown(config.level)

@@ -64,7 +64,16 @@ _BETWEEN_NAMES: Final = "/"
 _VARYING: Final = ("physics", "game", "level_of_row", "generators")
 """Of a `Snapshot`; its other fields are what the configuration says."""
 
-_OF_CURRICULUM: Final = ("success", "age", "idle", "task", "from_start", "clock", "generator")
+_OF_CURRICULUM: Final = (
+    "success",
+    "age",
+    "idle",
+    "anchor",
+    "task",
+    "from_start",
+    "clock",
+    "generator",
+)
 _JOURNEYS: Final = tuple(field.name for field in fields(Journeys))
 
 _REMEDY: Final = "remove the run's directory to train again from the start"

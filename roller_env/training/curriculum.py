@@ -47,9 +47,11 @@ _FREE_S: Final = 5.0
 """A game without a goal, taken over from an explorer, is practised this long."""
 
 _STALL_S: Final = 10.0
-"""A game from the start in which nothing was achieved for so long is over, as after a fall. An
-agent that stands still between two coins would else see nothing else for the rest of a minute, and
-think well of it."""
+"""A game from the start in which nothing was achieved for so long, and the ball stayed within
+`_ELSEWHERE_M`, is over, as after a fall. An agent that stands still between two coins would else
+see nothing else for the rest of a minute, and think well of it."""
+
+_ELSEWHERE_M: Final = 4.0
 
 _FREE: Final = 0.3
 """Fraction of the practice that begins where an explorer is, whatever can be done from there."""
@@ -82,7 +84,9 @@ class CurriculumSnapshot:
         games: those kept, by task.
         success: (tasks,) rate of success, 0 to 1.
         age: (rows,) steps since a game began or was put there.
-        idle: (rows,) steps since something was achieved, or a game began.
+        idle: (rows,) steps since something was achieved, a game began, or the ball left
+            `_ELSEWHERE_M` behind.
+        anchor: (rows, 3) where the ball was then, metres.
         task: (rows,) what a row is practising; -1 for nothing.
         from_start: (rows,) whether a game began at the start.
         clock: steps since the last tick.
@@ -96,6 +100,7 @@ class CurriculumSnapshot:
     success: Float64
     age: Int64
     idle: Int64
+    anchor: Float64
     task: Int64
     from_start: Bool
     clock: int
@@ -149,6 +154,7 @@ class StartStateCurriculum(VecEnvWrapper):
         self._recent: tuple[Snapshot, ...] = ()
         self._age = np.zeros(rows, dtype=np.int64)
         self._idle = np.zeros(rows, dtype=np.int64)
+        self._anchor = np.zeros((rows, 3))
         self._task = np.full(rows, _NONE)
         self._from_start = np.ones(rows, dtype=bool)
         self._clock = 0
@@ -157,6 +163,7 @@ class StartStateCurriculum(VecEnvWrapper):
         """Begin every episode at the start."""
         observations = self.environments.reset()
         self._begin_anew()
+        self._anchor[:] = self.environments.simulation.ball_position
         self._achieved = self.environments.simulation.state.achieved
         return self._learner_s(observations)
 
@@ -185,7 +192,8 @@ class StartStateCurriculum(VecEnvWrapper):
 
     def _practise(self, observations: Any, dones: Bool, infos: Sequence[dict[str, Any]]) -> None:
         """Keep, judge and begin games; ``dones`` and ``infos`` tell what was cut short."""
-        state = self.environments.simulation.state
+        simulation = self.environments.simulation
+        state = simulation.state
         finished = np.zeros(len(dones), dtype=bool)
         finished[dones] = [infos[row]["success"] for row in np.flatnonzero(dones).tolist()]
         done_now = np.column_stack([state.achieved & ~dones[:, None], finished])
@@ -194,8 +202,9 @@ class StartStateCurriculum(VecEnvWrapper):
         self._age += 1
         self._clock += 1
         self._keep(news)
+        elsewhere = np.linalg.norm(simulation.ball_position - self._anchor, axis=1) > _ELSEWHERE_M
         self._idle += 1
-        self._idle[news.any(axis=1)] = 0
+        self._idle[news.any(axis=1) | elsewhere] = 0
         practising = self._practises & ~self._from_start
         tired = practising & ~dones & (self._age >= self._limits())
         stalled = self._plays & ~dones & (self._idle >= self._steps(_STALL_S))
@@ -209,10 +218,11 @@ class StartStateCurriculum(VecEnvWrapper):
         self._begin(np.flatnonzero(dones & self._practises), observations)
         self._explorers.journeys.left[dones[self._explorers.rows]] = 0
         self._send_out(self._explorers.arrived())
+        fresh = self._idle == 0
+        self._anchor[fresh] = simulation.ball_position[fresh]
         if self._clock == self._tick:
             self._clock = 0
-            latest = self.environments.simulation.snapshot()
-            self._recent = (latest, *self._recent)[: LOOKS_BACK[-1]]
+            self._recent = (simulation.snapshot(), *self._recent)[: LOOKS_BACK[-1]]
 
     def _tell(self, rows: Int64, observations: Any, infos: Sequence[dict[str, Any]]) -> None:
         """Write into infos what is told of games that are cut short where they are."""
@@ -361,6 +371,7 @@ class StartStateCurriculum(VecEnvWrapper):
             success=self._success.copy(),
             age=self._age.copy(),
             idle=self._idle.copy(),
+            anchor=self._anchor.copy(),
             task=self._task.copy(),
             from_start=self._from_start.copy(),
             clock=self._clock,
@@ -376,6 +387,7 @@ class StartStateCurriculum(VecEnvWrapper):
         self._success = snapshot.success.copy()
         self._age = snapshot.age.copy()
         self._idle = snapshot.idle.copy()
+        self._anchor = snapshot.anchor.copy()
         self._task = snapshot.task.copy()
         self._from_start = snapshot.from_start.copy()
         self._clock = snapshot.clock

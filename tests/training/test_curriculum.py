@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 
 from roller_env.envs.sb3 import TRUNCATED, RollerVecEnv
 from roller_env.envs.spaces import shape_observation
+from roller_env.level import Level
 from roller_env.pieces.coin import COIN
 from roller_env.training.curriculum import FROM_START, LOOKS_BACK, TICK_S, StartStateCurriculum
+from tests.builders import make_level
 
 ROWS = 4
 EXPLORERS = 4
@@ -22,7 +24,7 @@ ALL = ROWS + EXPLORERS
 
 
 def with_curriculum(
-    fraction: float, level: str = "flat", explorers: int = EXPLORERS, **options: Any
+    fraction: float, level: str | Level = "flat", explorers: int = EXPLORERS, **options: Any
 ) -> StartStateCurriculum:
     fast = {"physics": "fast", "control_dt_s": 0.1, "max_episode_steps": 60}
     environments = RollerVecEnv(level, ROWS + explorers, seed=1, **fast | options)
@@ -103,6 +105,15 @@ def test_a_game_from_the_start_that_stalls_is_over_for_good() -> None:
     assert not any(info[TRUNCATED] or info["success"] for info in ended)
     steps = curriculum.environments.simulation.state.steps[ROWS // 2 : ROWS]
     assert steps.tolist() == [0] * (ROWS // 2)
+
+
+def test_a_game_that_is_on_its_way_does_not_stall() -> None:
+    curriculum = with_curriculum(0.5, make_level(), max_episode_steps=400)
+    nothing = np.zeros(ROWS, dtype=np.int64)
+    for step in range(250):
+        _, _, dones, _ = curriculum.step(FORWARD if step < 5 else nothing)
+        assert not dones.any(), step
+    assert curriculum.environments.simulation.ball_position[ROWS - 1, 0] > 20.0
 
 
 def test_the_time_limit_ends_a_game_for_good_since_the_agent_sees_it_coming() -> None:
