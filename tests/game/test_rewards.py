@@ -150,9 +150,9 @@ def test_when_no_coin_is_left_nearness_is_that_of_the_finish() -> None:
     )
     rails = Rails(level, reward="nearness")
     rails.go(resting(1.0))
-    finish, ball = np.array([9.0, 0.0, 0.5]), np.array(resting(5.0))
+    finish, ball = np.array([9.0, 0.0, 0.5]), np.array(resting(6.5))
     away = np.linalg.norm(finish - ball)
-    assert nearness_potential(rails, 5.0, 0.0) == pytest.approx(1.0 - away / NEARNESS_M)
+    assert nearness_potential(rails, 6.5, 0.0) == pytest.approx(1.0 - away / NEARNESS_M)
 
 
 def test_nearness_needs_no_route_and_adds_up_to_nothing_but_where_an_episode_begins() -> None:
