@@ -35,7 +35,8 @@ FLOOR = {"at": (8.0, 0.0, -0.5), "size": (20.0, 6.0, 1.0)}
 
 
 def play(preset: str = "default") -> Play:
-    return Play(PRESETS[preset].dt_s, math.hypot(KEY_FORCE_N, KEY_FORCE_N))
+    dt_s = PRESETS[preset].dt_s if PRESETS[preset].engine == "mujoco" else 0.0
+    return Play(dt_s, math.hypot(KEY_FORCE_N, KEY_FORCE_N))
 
 
 def warned(level: Level | None = None, preset: str = "default", **changes: Any) -> list[Problem]:
@@ -185,6 +186,25 @@ def test_a_gate_that_is_left_to_find_its_height_leaves_the_way_free_on_any_deck(
     assert "still stands 40 quants over the ground; wanted at most -100 quants" in problem.message
 
 
+def test_a_light_ball_that_slips_is_warned_of_since_mujoco_throws_it_up() -> None:
+    (problem,) = warned(ball={"mass_kg": 0.1})
+    assert problem.path == ("ball", "mass_kg")
+    assert "push with 7.2 N and friction on default holds 0.29 N: the ball slips" in problem.message
+    assert warned(preset="rigid", ball={"mass_kg": 0.1}) == []
+    # It slips on ice as well, which lifts a ball of 1 kg by a centimetre.
+    assert warned(ball={"friction": 0.03}) == []
+
+
+def test_friction_that_mujoco_ends_a_skid_late_with_is_warned_of_on_its_material() -> None:
+    rubber = {"rubber": {"friction": 4.0}}
+    floor = {"at": (0.0, 0.0, -0.5), "size": (20.0, 20.0, 1.0), "material": "rubber"}
+    changes: dict[str, Any] = {"boxes": [floor], "finish": finish_at(4.0, 0.0, 0.5)}
+    (problem,) = warned(materials=rubber, **changes)
+    assert problem.path == ("ball", "friction")
+    assert "friction on rubber is 1.2: " in problem.message
+    assert warned(preset="relaxed", materials=rubber, **changes) == []
+
+
 def test_a_floor_too_thin_for_the_falls_onto_it_is_warned_of() -> None:
     ball = {"radius": 0.05}
     tower = {"at": (0.0, 0.0, 19.5), "size": (2.0, 2.0, 1.0)}
@@ -237,7 +257,8 @@ def test_every_valid_level_can_be_looked_at(level: Level) -> None:
 def test_the_strangest_forces_do_no_harm() -> None:
     pad = {"at": (9.0, 0.0, 0.02), "size": (1, 1, 0.04), "force_n": 1e6, "duration_s": 86_400.0}
     ball = {"mass_kg": 0.001, "elasticity": 0.95}
-    assert fields(ball=ball, lift_pads=[pad], gravity=0.001) == [("boxes", 0), ("lift_pads", 0)]
+    found = fields(ball=ball, lift_pads=[pad], gravity=0.001)
+    assert found == [("ball", "mass_kg"), ("boxes", 0), ("lift_pads", 0)]
 
 
 def test_a_level_too_large_to_search_is_left_alone() -> None:
