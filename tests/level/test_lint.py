@@ -257,8 +257,8 @@ def test_every_valid_level_can_be_looked_at(level: Level) -> None:
 def test_the_strangest_forces_do_no_harm() -> None:
     pad = {"at": (9.0, 0.0, 0.02), "size": (1, 1, 0.04), "force_n": 1e6, "duration_s": 86_400.0}
     ball = {"mass_kg": 0.001, "elasticity": 0.95}
-    found = fields(ball=ball, lift_pads=[pad], gravity=0.001)
-    assert found == [("ball", "mass_kg"), ("boxes", 0), ("lift_pads", 0)]
+    found = set(fields(ball=ball, lift_pads=[pad], gravity=0.001))
+    assert found == {("ball", "mass_kg"), ("boxes", 0), ("lift_pads", 0)}
 
 
 def test_a_level_too_large_to_search_is_left_alone() -> None:
