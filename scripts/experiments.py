@@ -75,7 +75,6 @@ def main(arguments: Arguments) -> None:
     print(trainings.each_seed_table(stem))
     figure = trainings.draw_curves(
         stem,
-        "One recipe, five levels, ten seeds that nobody tuned on",
         "Share of the coins and of the games at the finish, of whole games from the start in "
         "training (sampled actions, not the deterministic ones of the evaluation); line: median of "
         "the seeds, band: all of them; dashed: 95 %.",

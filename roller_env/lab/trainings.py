@@ -236,7 +236,8 @@ def seeds_table(stem: Path) -> str:
     results = _frame(_results(stem))
     results["learnt"] = (results.finish >= GOOD) & (results.coins >= GOOD)
     rows = []
-    for level, own in results.groupby("level", sort=False):
+    for level in [level for level in LEVELS if level in set(results.level)]:
+        own = results[results.level == level]
         rows.append(
             {
                 "level": level,
@@ -246,7 +247,7 @@ def seeds_table(stem: Path) -> str:
                 "coins, mean": _percent(own.coins.mean()),
                 "worst seed": _percent(own.coins.min()),
                 "time of a game": f"{own.time_s.median():.1f} s",
-                "training": f"{own.train_wall_s.median():.0f} s",
+                "training, CPU": f"{own.train_cpu_s.median():.0f} s",
             }
         )
     return markdown(Frame(rows))
@@ -286,12 +287,13 @@ def _percent(share: float) -> str:
 
 
 @chart.styled
-def draw_curves(stem: Path, title: str, note: str) -> Figure:
+def draw_curves(stem: Path, note: str) -> Figure:
     """Draw how coins and finishes grow with the steps, a panel a level, over all seeds."""
     curves = _frame(_curves(stem))
+    title = f"One recipe on every level, seeds {curves.seed.min()} to {curves.seed.max()}"
     levels = [level for level in LEVELS if level in set(curves.level)]
     figure, panels = chart.grid(
-        (1, len(levels)), title, note, panel=(2.5, 2.3), margins=(0.7, 0.3, 0.9, 0.8), sharey=True
+        (1, len(levels)), title, note, panel=(2.5, 2.3), margins=(0.7, 0.3, 1.15, 0.8), sharey=True
     )
     shares = (("coins", "coins", chart.SERIES[2]), ("finish", "at the finish", chart.SERIES[0]))
     for axes, level in zip(panels[0], levels, strict=True):
