@@ -33,7 +33,7 @@ class Arguments:
     """Make the trainings of an experiment that are missing, and print its tables."""
 
     experiment: Annotated[Literal["seeds", "factors"], tyro.conf.Positional] = "seeds"
-    """seeds: the recipe on every level with the seeds 30 to 39; factors: what is left of it when
+    """seeds: the recipe on every level with the seeds 40 to 49; factors: what is left of it when
     one thing is changed, on flat and bridge."""
 
     show: bool = False
