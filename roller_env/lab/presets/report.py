@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shutil
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from roller_env.lab import chart
+from roller_env.lab import chart, pages
 from roller_env.lab.methods import without_warnings
 from roller_env.lab.presets.costs import AS_CHOSEN, Games, costs
 from roller_env.lab.presets.errors import REFERENCE_HZ, REQUIREMENTS, errors_of, violations
@@ -98,8 +97,6 @@ _COLUMNS: Final[Mapping[str, tuple[str, float]]] = {
 }
 """Of the table: a title, the column, and by what it is multiplied."""
 
-_BEGIN: Final = "<!-- measured: python scripts/presets.py --docs docs -->"
-_END: Final = "<!-- end of what was measured -->"
 _PUBLISHED: Final[Mapping[str, str]] = {
     "front": "presets.png",
     "requirements": "presets-requirements.png",
@@ -126,18 +123,11 @@ def publish(out: Path, docs: Path) -> list[Path]:
     Raises:
         ValueError: the page has not exactly one place for the tables; nothing is changed then.
     """
-    page = docs / "presets.md"
-    text = page.read_text(encoding="utf-8")
-    before, *rest = text.split(_BEGIN)
-    if len(rest) != 1 or rest[0].count(_END) != 1:
-        raise ValueError(f"{page}: must have one line {_BEGIN!r} and, after it, one {_END!r}")
-    after = rest[0].partition(_END)[2]
-    measured = (out / "presets.md").read_text(encoding="utf-8")
-    page.write_text(f"{before}{_BEGIN}\n\n{measured}\n{_END}{after}", encoding="utf-8")
-    pictures = [docs / "images" / published for published in _PUBLISHED.values()]
-    for name, picture in zip(_PUBLISHED, pictures, strict=True):
-        shutil.copyfile(out / f"{name}.png", picture)
-    return [page, *pictures]
+    pictures = {
+        out / f"{name}.png": docs / "images" / published for name, published in _PUBLISHED.items()
+    }
+    command = "python scripts/presets.py --docs docs"
+    return pages.publish(docs / "presets.md", command, out / "presets.md", pictures)
 
 
 def tables(settings: Frame, ablations: Frame) -> str:

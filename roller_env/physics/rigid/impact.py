@@ -18,6 +18,7 @@ from roller_env.physics.rigid.kernels import (
     norm,
     plus,
     store,
+    sub,
     vector,
 )
 from roller_env.physics.rigid.sliding import SLIP_SHARE
@@ -42,6 +43,12 @@ STICK_M_S: Final = 1e-9
 
 _MOST_PROJECTIONS: Final = 50
 
+_ROUNDING: Final = 1.0 + 1e-9
+"""Share of the energy that is no gain."""
+
+_OPPOSED: Final = -1.0 + 1e-12
+"""Cosine of the angle between normals that face each other."""
+
 
 @kernel
 def velocity_over(contact: Record, v: Vector) -> Vector:
@@ -62,12 +69,16 @@ def true_slip(contact: Record, radius: float, twist: Twist) -> Vector:
 
 
 @kernel
+def _kinetic(radius: float, twist: Twist) -> float:
+    """Return twice the kinetic energy over the mass."""
+    v, w = twist
+    return dot(v, v) + 0.4 * radius * radius * dot(w, w)
+
+
+@kernel
 def calmed(before: Twist, after: Twist, radius: float) -> Twist:
     """Return velocities that are no answer, or none if they would have gained energy."""
-    inertia = 0.4 * radius * radius
-    was = dot(before.linear, before.linear) + inertia * dot(before.angular, before.angular)
-    is_now = dot(after.linear, after.linear) + inertia * dot(after.angular, after.angular)
-    if is_now <= was:
+    if _kinetic(radius, after) <= _kinetic(radius, before):
         return after
     return Twist((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
@@ -104,6 +115,21 @@ def _ask_back(contact: Record, radius: float, twist: Twist) -> None:
 
 
 @kernel
+def _squeezed(work: Record, count: int) -> bool:
+    """Say whether two contacts face each other and close in: then nothing rigid gives."""
+    for i in range(count):
+        a = work.contact[i]
+        n = vector(a.normal)
+        for j in range(i):
+            b = work.contact[j]
+            if dot(n, vector(b.normal)) < _OPPOSED:
+                apart = dot(n, sub(vector(b.surface), vector(a.surface)))
+                if apart < a.bias + b.bias - CLOSED_M_S:
+                    return True
+    return False
+
+
+@kernel
 def solve_jam(
     work: Record, count: int, radius: float, free: Twist, alike: float
 ) -> tuple[Twist, bool]:
@@ -133,7 +159,9 @@ def collide(
     A moving slab that would have to pass through the ball stands still for the rest of the step:
     what squeezes a rigid ball against something rigid is held up by it.
 
-    Nothing bounces out of a jam: see `solve_jam`.
+    Nothing bounces out of a jam: see `solve_jam`. Nor does what would gain energy by it, as
+    restitution at several contacts with friction can (T. R. Kane, D. A. Levinson, *Dynamics: Theory
+    and Applications*, 1985). Such an impact is plastic.
     """
     approaches, most = False, closed_m_s(work, count)
     for i in range(count):
@@ -146,8 +174,9 @@ def collide(
         _ask_back(contact, radius, twist)
         moving = moving or contact.rise != 0.0
         fastest = max(fastest, abs(contact.rise))
-    after, solved = solve(work, count, radius, twist, EXACT)
-    blocked = 0
+    after, solved, blocked = twist, False, 0
+    if not (moving and _squeezed(work, count)):
+        after, solved = solve(work, count, radius, twist, EXACT)
     if moving and (not solved or norm(after.linear) > 4.0 * fastest + 1.0):
         for i in range(count):
             contact = work.contact[i]
@@ -158,7 +187,8 @@ def collide(
             contact.rise, contact.bias = 0.0, 0.0
             store(contact.surface, (0.0, 0.0, 0.0))
         after, solved = solve(work, count, radius, twist, EXACT)
-    if not solved:
+    gains = not moving and _kinetic(radius, after) > _ROUNDING * _kinetic(radius, twist)
+    if not solved or gains:
         after, solved = solve_jam(work, count, radius, twist, EXACT)
     return after, solved, blocked
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from roller_env.arrays import Float64
-from roller_env.physics.rigid.scene import RigidLevel, pack
+from roller_env.arrays import Bool, Float64
+from roller_env.physics.rigid.scene import RigidLevel, Scenes, pack
 from roller_env.physics.rigid.states import Counts, make_counts, make_states
 from roller_env.physics.rigid.step import advance
 from roller_env.physics.rigid.workspace import make_workspace
@@ -61,15 +62,40 @@ class Balls:
         total: Float64 = level.mass * (kinetic + level.gravity * self.states.position[:, 2])
         return total
 
+    def angular_velocity(self) -> Float64:
+        """Return (N, 3) rad/s, world frame."""
+        turned: Float64 = Rotation.from_quat(self.states.orientation, scalar_first=True).apply(
+            self.states.spin
+        )
+        return turned
+
     def depth(self) -> Float64:
         """Return (N,) how deep each ball is in a solid, metres; negative where it is free."""
-        deepest = np.full(len(self._rows), -np.inf)
-        for solid in self._scenes.solid:
-            relative = self.states.position - solid.centre
-            if solid.slab >= 0:
-                relative[:, 2] -= self.states.slab[:, solid.slab]
-            beyond = np.abs(relative @ solid.axes.T) - solid.half
-            outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
-            distance = np.where(outside > 0.0, outside, beyond.max(axis=1))
-            deepest = np.maximum(deepest, self.level.radius - distance)
-        return deepest
+        states = self.states
+        gaps = solid_gaps(self._scenes, states.position, states.slab)[0]
+        depth: Float64 = self.level.radius - gaps.min(axis=1, initial=np.inf)
+        return depth
+
+
+def solid_gaps(scenes: Scenes, places: Float64, slabs: Float64) -> tuple[Float64, Bool]:
+    """Return (N, solids) the distances of places from solids, and whether of an edge or corner.
+
+    Args:
+        scenes: of one level.
+        places: (N, 3) metres.
+        slabs: (N, P) how far each slab has moved, metres.
+
+    Returns:
+        The distances, metres; negative inside. And where the nearest point is not on a face.
+    """
+    gaps = np.empty((len(places), len(scenes.solid)))
+    rounded = np.empty(gaps.shape, dtype=np.bool_)
+    for number, solid in enumerate(scenes.solid):
+        relative = places - solid.centre
+        if solid.slab >= 0:
+            relative[:, 2] -= slabs[:, solid.slab]
+        beyond = np.abs(relative @ solid.axes.T) - solid.half
+        outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+        gaps[:, number] = np.where(outside > 0.0, outside, beyond.max(axis=1))
+        rounded[:, number] = (beyond > 0.0).sum(axis=1) > 1
+    return gaps, rounded

@@ -15,7 +15,7 @@ import numpy as np
 from roller_env.arrays import Float64
 from roller_env.compile.compiled import compile_level
 from roller_env.compile.rigid import rigid_level
-from roller_env.lab.rigid.balls import STEP_S, Balls
+from roller_env.lab.engines.balls import STEP_S, Balls
 from roller_env.level import Level, load_level
 from roller_env.physics.presets import DEFAULT, PhysicsPreset
 from roller_env.physics.rigid.law import COULOMB, RELAXED, ContactLaw
