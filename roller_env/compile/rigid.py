@@ -61,7 +61,7 @@ def rigid_level(level: Level, law: ContactLaw = COULOMB) -> RigidLevel:
         )
 
     return RigidLevel(
-        boxes=[
+        solids=[
             *map(box, merge_solids(expanded.ground)),
             *map(box, expanded.machines),
             *(box(mover.solid, number) for number, mover in enumerate(expanded.movers)),

@@ -57,7 +57,7 @@ class Row:
 
 def _faces(scenes: Scenes, slabs: Float64, radius: float, path: Path) -> tuple[Bool, Bool]:
     """Return which solids, (N, solids), and whether any edge, (N,), the balls' paths touch."""
-    touched = np.zeros((len(path.knots), len(scenes.solid)), dtype=np.bool_)
+    touched = np.zeros((len(path.knots), len(scenes.solids.one)), dtype=np.bool_)
     edge = np.zeros(len(path.knots), dtype=np.bool_)
     for knot in range(int(path.knots.max())):
         there = (knot < path.knots)[:, None]
@@ -77,7 +77,10 @@ def row(name: str, reference: PhysicsPreset, count: int = 96, seconds: float = 3
     for balls in (ours, theirs):
         balls.put(how.position, how.velocity, how.spin(level.ball.radius))
     scenes = pack([rigid_level(level)])
-    touched, edges = np.zeros((count, len(scenes.solid)), dtype=np.bool_), np.zeros(count, np.bool_)
+    touched, edges = (
+        np.zeros((count, len(scenes.solids.one)), dtype=np.bool_),
+        np.zeros(count, np.bool_),
+    )
     apart, angle, alone_s = np.zeros((3, count))
     for step in range(steps):
         force = how.force[step // _KEYS_A_STEP]

@@ -88,12 +88,12 @@ def solid_gaps(scenes: Scenes, places: Float64, slabs: Float64) -> tuple[Float64
     Returns:
         The distances, metres; negative inside. And where the nearest point is not on a face.
     """
-    gaps = np.empty((len(places), len(scenes.solid)))
+    gaps = np.empty((len(places), len(scenes.solids.one)))
     rounded = np.empty(gaps.shape, dtype=np.bool_)
-    for number, solid in enumerate(scenes.solid):
+    for number, solid in enumerate(scenes.solids.one):
         relative = places - solid.centre
         if solid.slab >= 0:
-            relative[:, 2] -= slabs[:, solid.slab]
+            relative -= slabs[:, solid.slab, None] * solid.along
         beyond = np.abs(relative @ solid.axes.T) - solid.half
         outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
         gaps[:, number] = np.where(outside > 0.0, outside, beyond.max(axis=1))

@@ -295,7 +295,8 @@ def _both_stick(work: Record, radius: float, free: Twist, alike: float) -> tuple
     axis = scaled(1.0 / distance, apart)
     point_a = plus(vector(first.surface), first.bias, a)
     differ = sub(point_a, plus(vector(second.surface), second.bias, b))
-    allowed = alike * norm(differ) if first.rise == second.rise else 0.0
+    moves = sub(vector(first.carried), vector(second.carried))
+    allowed = alike * norm(differ) if dot(moves, moves) == 0.0 else 0.0
     possible = abs(dot(axis, differ)) <= max(allowed, EXACT * norm(free.linear))
     lever = cross(axis, scaled(radius, a))
     inertia = 0.4 * radius * radius

@@ -13,8 +13,8 @@ from roller_env.physics.rigid.impact import velocity_over
 from roller_env.physics.rigid.impact_time import CONTACT_GAP_M, impact_time
 from roller_env.physics.rigid.kernels import (
     Record,
-    Records,
     Vector,
+    alike,
     dot,
     first_root,
     inlined,
@@ -23,12 +23,13 @@ from roller_env.physics.rigid.kernels import (
     vector,
 )
 from roller_env.physics.rigid.near import WELD_M
+from roller_env.physics.rigid.scene import Solids
 
 
 @inlined
 def features_end(
     work: Record,
-    solids: Records,
+    solids: Solids,
     count: int,
     p: Vector,
     v: Vector,
@@ -39,28 +40,28 @@ def features_end(
     """Return when, before ``until``, the ball leaves a feature that holds it, or ``until``."""
     for i in range(count):
         contact = work.contact[i]
-        solid = solids[contact.solid]
+        solid = solids.one[contact.solid]
         relative = from_centre(solid, contact.shift, p)
-        margin = feature_margin(solid, contact.kind, contact.axis, relative)
-        if margin <= way + abs(contact.rise) * until:
+        margin = feature_margin(solids, solid, contact.kind, contact.axis, relative)
+        if margin <= way + abs(contact.speed) * until:
             velocity = velocity_over(contact, v)
-            end = time_on_feature(solid, contact.kind, contact.axis, relative, velocity, a)
+            end = time_on_feature(solids, solid, contact.kind, contact.axis, relative, velocity, a)
             until = min(until, end)
     return until
 
 
 @inlined
-def goes_alone(work: Record, solids: Records, p: Vector, way: float, until: float) -> bool:
+def goes_alone(work: Record, solids: Solids, p: Vector, way: float, until: float) -> bool:
     """Say whether a ball on one face, of the first contact, meets nothing and stays on it."""
     contact = work.contact[0]
-    solid = solids[contact.solid]
+    solid = solids.one[contact.solid]
     relative = from_centre(solid, contact.shift, p)
-    margin = feature_margin(solid, contact.kind, contact.axis, relative)
-    if margin <= way + abs(contact.rise) * until:
+    margin = feature_margin(solids, solid, contact.kind, contact.axis, relative)
+    if margin <= way + abs(contact.speed) * until:
         return False
     for place in range(work.found):
         near = work.near[place]
-        if near.solid != contact.solid and near.gap <= way + abs(near.rise) * until:
+        if near.solid != contact.solid and near.gap <= way + abs(near.speed) * until:
             return False
     return True
 
@@ -68,7 +69,7 @@ def goes_alone(work: Record, solids: Records, p: Vector, way: float, until: floa
 @inlined
 def next_impact(
     work: Record,
-    solids: Records,
+    solids: Solids,
     count: int,
     radius: float,
     p: Vector,
@@ -92,13 +93,13 @@ def next_impact(
     """
     for place in range(work.found):
         near = work.near[place]
-        if near.gap > way + abs(near.rise) * until + CONTACT_GAP_M:
+        if near.gap > way + abs(near.speed) * until + CONTACT_GAP_M:
             continue
         if count > 0 and work.contact[0].solid == near.solid:
             continue
-        solid = solids[near.solid]
+        solid = solids.one[near.solid]
         n = vector(near.normal)
-        velocity = sub(v, (0.0, 0.0, near.rise))
+        velocity = sub(v, vector(near.carried))
         gap = max(near.gap, 0.5 * CONTACT_GAP_M)
         if near.gap > CONTACT_GAP_M or near.kind == FACE:
             # The supporting plane at the start rules most of them out.
@@ -106,16 +107,22 @@ def next_impact(
             if soonest >= until:
                 continue
         relative = from_centre(solid, near.shift, p)
-        if _cannot_meet(work, solid, near, count, radius, relative):
+        if _cannot_meet(work, solids, solid, near, count, radius, relative):
             continue
-        time = impact_time(solid, radius, relative, velocity, a, gap, n, near.kind, until)
+        time = impact_time(solids, solid, radius, relative, velocity, a, gap, n, near.kind, until)
         until = min(until, time)
     return until
 
 
 @kernel
 def _cannot_meet(
-    work: Record, solid: Record, near: Record, count: int, radius: float, relative: Vector
+    work: Record,
+    solids: Solids,
+    solid: Record,
+    near: Record,
+    count: int,
+    radius: float,
+    relative: Vector,
 ) -> bool:
     """Say whether a solid holds the ball, or lies wholly behind a face that does."""
     for i in range(count):
@@ -123,8 +130,8 @@ def _cannot_meet(
             return True
     for i in range(count):
         contact = work.contact[i]
-        if contact.kind == FACE and contact.rise == near.rise:
+        if contact.kind == FACE and alike(vector(contact.carried), vector(near.carried)):
             n = vector(contact.normal)
-            if extent(solid, n) - dot(n, relative) + radius <= WELD_M:
+            if extent(solids, solid, n) - dot(n, relative) + radius <= WELD_M:
                 return True
     return False

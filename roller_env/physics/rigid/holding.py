@@ -18,7 +18,6 @@ from roller_env.physics.rigid.impact import (
 from roller_env.physics.rigid.kernels import (
     Ball,
     Record,
-    Records,
     Twist,
     Vector,
     cross,
@@ -34,6 +33,7 @@ from roller_env.physics.rigid.kernels import (
     tangential,
     vector,
 )
+from roller_env.physics.rigid.scene import Solids
 from roller_env.physics.rigid.workspace import swap
 
 STRAIGHT: Final = 1e-6
@@ -99,7 +99,7 @@ def lay_out(work: Record, count: int, radius: float, ball: Ball, time: float) ->
         contact = work.contact[i]
         if contact.kind != FACE:
             pivot = vector(contact.pivot)
-            arm = sub(ball.position, (pivot[0], pivot[1], pivot[2] + time * contact.rise))
+            arm = sub(ball.position, plus(pivot, time, vector(contact.carried)))
             if contact.kind == EDGE:
                 edge = vector(contact.edge)
                 arm = plus(arm, -dot(arm, edge), edge)
@@ -160,7 +160,7 @@ def choose_motion(
     for i in range(count):
         contact = work.contact[i]
         turning = vector(contact.surface)
-        store(contact.surface, plus((0.0, 0.0, contact.rise), step, turning))
+        store(contact.surface, plus(vector(contact.carried), step, turning))
         contact.bias *= step
         contact.slides = 0
     free = Twist(plus(twist.linear, step, pull), twist.angular)
@@ -203,12 +203,12 @@ def slip_time(work: Record, count: int, radius: float, twist: Twist, rates: Twis
 
 
 @kernel
-def lift_off_time(work: Record, solids: Records, count: int, radius: float, rates: Twist) -> float:
+def lift_off_time(work: Record, solids: Solids, count: int, radius: float, rates: Twist) -> float:
     """Return in what time a slip grows to one that lifts the ball off, or ``inf``."""
     time = math.inf
     for i in range(count):
         contact = work.contact[i]
-        dilatancy = solids[contact.solid].dilatancy
+        dilatancy = solids.one[contact.solid].dilatancy
         if contact.status == SLIPS and dilatancy > 0.0:
             most = CHATTER_M_S if count > 1 else LIFTED_M_S
             most *= 1.0 + SLIP_PER_IMPULSE * contact.friction * dilatancy

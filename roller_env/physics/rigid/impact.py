@@ -21,6 +21,7 @@ from roller_env.physics.rigid.kernels import (
     sub,
     vector,
 )
+from roller_env.physics.rigid.scene import Solids
 from roller_env.physics.rigid.sliding import SLIP_SHARE
 from roller_env.physics.rigid.workspace import swap
 
@@ -53,7 +54,7 @@ _OPPOSED: Final = -1.0 + 1e-12
 @kernel
 def velocity_over(contact: Record, v: Vector) -> Vector:
     """Return a velocity relative to a contact's solid."""
-    return v[0], v[1], v[2] - contact.rise
+    return sub(v, vector(contact.carried))
 
 
 @kernel
@@ -65,7 +66,7 @@ def opening(contact: Record, v: Vector) -> float:
 @kernel
 def true_slip(contact: Record, radius: float, twist: Twist) -> Vector:
     """Return the velocity of the ball's point of contact over the solid, m/s."""
-    return slip_over(vector(contact.normal), (0.0, 0.0, contact.rise), radius, twist)
+    return slip_over(vector(contact.normal), vector(contact.carried), radius, twist)
 
 
 @kernel
@@ -104,7 +105,7 @@ def closing(contact: Record, radius: float, twist: Twist) -> float:
 @kernel
 def _ask_back(contact: Record, radius: float, twist: Twist) -> None:
     """Write what the restitution asks of the velocities at a contact."""
-    store(contact.surface, (0.0, 0.0, contact.rise))
+    store(contact.surface, vector(contact.carried))
     contact.bias, contact.slides = 0.0, 0
     approach = opening(contact, twist.linear)
     if approach < -REST_M_S:
@@ -143,7 +144,7 @@ def solve_jam(
     for i in range(count):
         contact = work.contact[i]
         contact.bias = 0.0
-        store(contact.surface, (0.0, 0.0, contact.rise))
+        store(contact.surface, vector(contact.carried))
     after, solved = solve(work, count, radius, free, alike)
     if not solved:
         after = calmed(free, after, radius)
@@ -152,7 +153,7 @@ def solve_jam(
 
 @inlined
 def collide(
-    work: Record, slabs: Records, solids: Records, count: int, radius: float, twist: Twist
+    work: Record, slabs: Records, solids: Solids, count: int, radius: float, twist: Twist
 ) -> tuple[Twist, bool, int]:
     """Return the velocities after the impacts, success, and how many slabs were held up.
 
@@ -172,19 +173,20 @@ def collide(
     for i in range(count):
         contact = work.contact[i]
         _ask_back(contact, radius, twist)
-        moving = moving or contact.rise != 0.0
-        fastest = max(fastest, abs(contact.rise))
+        moving = moving or contact.speed != 0.0
+        fastest = max(fastest, abs(contact.speed))
     after, solved, blocked = twist, False, 0
     if not (moving and _squeezed(work, count)):
         after, solved = solve(work, count, radius, twist, EXACT)
     if moving and (not solved or norm(after.linear) > 4.0 * fastest + 1.0):
         for i in range(count):
             contact = work.contact[i]
-            number = solids[contact.solid].slab
+            number = solids.one[contact.solid].slab
             if number >= 0 and slabs[number].speed != 0.0:
                 slabs[number].speed = 0.0
                 blocked += 1
-            contact.rise, contact.bias = 0.0, 0.0
+            contact.speed, contact.bias = 0.0, 0.0
+            store(contact.carried, (0.0, 0.0, 0.0))
             store(contact.surface, (0.0, 0.0, 0.0))
         after, solved = solve(work, count, radius, twist, EXACT)
     gains = not moving and _kinetic(radius, after) > _ROUNDING * _kinetic(radius, twist)

@@ -21,6 +21,7 @@ from roller_env.physics.rigid.kernels import (
     kernel,
     position_at,
 )
+from roller_env.physics.rigid.scene import Solids
 
 CONTACT_GAP_M: Final = 1e-9
 """A ball this near to a solid touches it. Held balls are kept at half of it."""
@@ -31,6 +32,7 @@ _MOST_HALVINGS: Final = 48
 
 @kernel
 def impact_time(
+    solids: Solids,
     solid: Record,
     radius: float,
     from_centre: Vector,
@@ -41,15 +43,16 @@ def impact_time(
     kind: int,
     before: float,
 ) -> float:
-    """Return the first time in [0, ``before``) at which the ball touches a box, or ``inf``.
+    """Return the first time in [0, ``before``) at which the ball touches a solid, or ``inf``.
 
     Args:
-        solid: the box.
+        solids: all.
+        solid: one of them.
         radius: of the ball, metres.
-        from_centre: the ball's centre relative to the box's, world axes, metres.
-        velocity: relative to the box, m/s.
+        from_centre: the ball's centre relative to the solid's, world axes, metres.
+        velocity: relative to the solid, m/s.
         acceleration: likewise, m/s^2.
-        gap: between ball and box at the start, metres. A ball that touches counts as just free.
+        gap: between ball and solid at the start, metres. A ball that touches counts as just free.
         normal: from the nearest feature to the ball, at the start.
         kind: of that feature.
         before: how far to look, seconds.
@@ -59,11 +62,11 @@ def impact_time(
     if gap <= CONTACT_GAP_M and kind != FACE:
         # A round feature's plane is met again at once by a ball that rolls off it, the feature
         # itself is not: begin where the ball is seen to be free.
-        time = _time_when_free(solid, radius, from_centre, velocity, acceleration, before)
+        time = _time_when_free(solids, solid, radius, from_centre, velocity, acceleration, before)
         if time >= before:
             return math.inf
         there = position_at(from_centre, velocity, acceleration, time)
-        distance, normal, _, _ = closest(solid, there)
+        distance, normal, _, _ = closest(solids, solid, there)
         gap = max(distance - radius, 0.5 * CONTACT_GAP_M)
     for _ in range(_MOST_PLANES):
         approach = dot(normal, velocity) + time * dot(normal, acceleration)
@@ -72,7 +75,7 @@ def impact_time(
         if time >= before:
             return math.inf
         there = position_at(from_centre, velocity, acceleration, time)
-        distance, normal, _, _ = closest(solid, there)
+        distance, normal, _, _ = closest(solids, solid, there)
         gap = distance - radius
         if gap <= 0.5 * CONTACT_GAP_M:
             return time
@@ -81,6 +84,7 @@ def impact_time(
 
 @kernel
 def _time_when_free(
+    solids: Solids,
     solid: Record,
     radius: float,
     from_centre: Vector,
@@ -88,11 +92,11 @@ def _time_when_free(
     acceleration: Vector,
     before: float,
 ) -> float:
-    """Return a time, at most ``before``, at which a ball that leaves a box does not overlap it."""
+    """Return a time, at most ``before``, at which a ball that leaves a solid is free of it."""
     time = before
     for _ in range(_MOST_HALVINGS):
         there = position_at(from_centre, velocity, acceleration, time)
-        distance, _, _, _ = closest(solid, there)
+        distance, _, _, _ = closest(solids, solid, there)
         if distance - radius >= 0.0:
             break
         time *= 0.5

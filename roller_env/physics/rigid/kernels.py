@@ -74,6 +74,11 @@ def sub(a: Vector, b: Vector) -> Vector:
 
 
 @kernel
+def alike(a: Vector, b: Vector) -> bool:
+    return a[0] == b[0] and a[1] == b[1] and a[2] == b[2]
+
+
+@kernel
 def scaled(factor: float, a: Vector) -> Vector:
     return factor * a[0], factor * a[1], factor * a[2]
 

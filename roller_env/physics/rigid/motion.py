@@ -18,7 +18,6 @@ from roller_env.physics.rigid.impact_time import CONTACT_GAP_M
 from roller_env.physics.rigid.kernels import (
     Ball,
     Record,
-    Records,
     Twist,
     Vector,
     add,
@@ -34,6 +33,7 @@ from roller_env.physics.rigid.kernels import (
     tangential,
     vector,
 )
+from roller_env.physics.rigid.scene import Solids
 from roller_env.physics.rigid.sliding import SLIP_SHARE, slide, stop_time
 
 LONGEST_ARC: Final = 0.05
@@ -172,7 +172,7 @@ def hermite(ball: Ball, after: Ball, duration: float, time: float) -> Vector:
 @kernel
 def _room(
     work: Record,
-    solids: Records,
+    solids: Solids,
     count: int,
     radius: float,
     ball: Ball,
@@ -195,9 +195,9 @@ def _room(
         else:
             u = true_slip(contact, radius, Twist(ball.velocity, ball.spin))
             room = min(room, dot(vector(contact.start), u) + 0.5 * STICK_M_S)
-        solid = solids[contact.solid]
-        relative = from_centre(solid, contact.shift + time * contact.rise, ball.position)
-        room = min(room, feature_margin(solid, contact.kind, contact.axis, relative))
+        solid = solids.one[contact.solid]
+        relative = from_centre(solid, contact.shift + time * contact.speed, ball.position)
+        room = min(room, feature_margin(solids, solid, contact.kind, contact.axis, relative))
     return room
 
 
@@ -210,7 +210,7 @@ def _directions_as_at_start(work: Record, count: int) -> None:
 @kernel
 def curve_until(
     work: Record,
-    solids: Records,
+    solids: Solids,
     count: int,
     radius: float,
     ball: Ball,
@@ -252,15 +252,15 @@ def curve_until(
 
 @kernel
 def back_to_surface(
-    work: Record, solids: Records, count: int, radius: float, p: Vector, time: float
+    work: Record, solids: Solids, count: int, radius: float, p: Vector, time: float
 ) -> Vector:
     """Return the centre at the contacts' distance again, of which steps keep only most."""
     for _ in range(1 if count == 1 else 4):
         for i in range(count):
             contact = work.contact[i]
-            solid = solids[contact.solid]
-            relative = from_centre(solid, contact.shift + time * contact.rise, p)
-            distance, n, _, _ = closest(solid, relative)
+            solid = solids.one[contact.solid]
+            relative = from_centre(solid, contact.shift + time * contact.speed, p)
+            distance, n, _, _ = closest(solids, solid, relative)
             error = distance - radius - 0.5 * CONTACT_GAP_M
             if abs(error) < 1e-3:
                 p = plus(p, -error, n)
@@ -277,7 +277,7 @@ def without_gain(
     them are 0, which a smaller multiple keeps.
     """
     for i in range(count):
-        if work.contact[i].rise != 0.0:
+        if work.contact[i].speed != 0.0:
             return twist
     before = _kinetic(radius, ball.velocity, ball.spin) + dot(pull, sub(p, ball.position))
     after = _kinetic(radius, twist.linear, twist.angular)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from roller_env.physics.rigid.closest import EDGE, FACE, closest, from_centre
+from roller_env.physics.rigid.closest import EDGE, FACE, closest, edge_direction, from_centre
 from roller_env.physics.rigid.impact_time import CONTACT_GAP_M
 from roller_env.physics.rigid.kernels import (
     Record,
@@ -16,11 +16,12 @@ from roller_env.physics.rigid.kernels import (
     kernel,
     none_of,
     plus,
-    row,
+    scaled,
     store,
+    sub,
     vector,
 )
-from roller_env.physics.rigid.scene import MARGIN_M, Scenes
+from roller_env.physics.rigid.scene import MARGIN_M, Scenes, Solids
 from roller_env.physics.rigid.workspace import MOST_CONTACTS, swap
 
 WELD_M: Final = 100.0 * CONTACT_GAP_M
@@ -79,19 +80,19 @@ def gather(
     found = 0
     for place in range(scenes.cell_start[cell], scenes.cell_start[cell + 1]):
         number = scenes.cell_solid[place]
-        solid = scenes.solid[number]
-        low, high = solid.low[2], solid.high[2]
+        solid = scenes.solids.one[number]
+        at, around = position, wide
         if solid.slab >= 0:
             slab = slabs[solid.slab]
-            moved = abs(slab.speed) * left
-            low, high = low + slab.shift - moved, high + slab.shift + moved
+            at = plus(position, -slab.shift, vector(solid.along))
+            around = wide + abs(slab.speed) * left
         if (
-            position[2] - wide > high
-            or position[2] + wide < low
-            or position[0] - wide > solid.high[0]
-            or position[0] + wide < solid.low[0]
-            or position[1] - wide > solid.high[1]
-            or position[1] + wide < solid.low[1]
+            at[2] - around > solid.high[2]
+            or at[2] + around < solid.low[2]
+            or at[0] - around > solid.high[0]
+            or at[0] + around < solid.low[0]
+            or at[1] - around > solid.high[1]
+            or at[1] + around < solid.low[1]
         ):
             continue
         work.near[found].solid = number
@@ -100,29 +101,32 @@ def gather(
 
 
 @inlined
-def touch(solids: Records, slabs: Records, work: Record, radius: float, position: Vector) -> int:
+def touch(solids: Solids, slabs: Records, work: Record, radius: float, position: Vector) -> int:
     """Measure the distances of all that is near, and list the contacts; return how many."""
     count = 0
     for place in range(work.found):
         near = work.near[place]
-        solid = solids[near.solid]
-        shift = rise = 0.0
+        solid = solids.one[near.solid]
+        shift = speed = 0.0
         if solid.slab >= 0:
-            shift, rise = slabs[solid.slab].shift, slabs[solid.slab].speed
-        near.shift, near.rise = shift, rise
-        distance, normal, kind, axis = closest(solid, from_centre(solid, shift, position))
+            shift, speed = slabs[solid.slab].shift, slabs[solid.slab].speed
+        near.shift, near.speed = shift, speed
+        carried = scaled(speed, vector(solid.along))
+        store(near.carried, carried)
+        distance, normal, kind, axis = closest(solids, solid, from_centre(solid, shift, position))
         gap = distance - radius
         near.gap, near.kind = gap, kind
         store(near.normal, normal)
         if gap <= CONTACT_GAP_M and count < MOST_CONTACTS:
             contact = work.contact[count]
             contact.solid, contact.kind, contact.axis = near.solid, kind, axis
-            contact.gap, contact.shift, contact.rise = gap, shift, rise
+            contact.gap, contact.shift, contact.speed = gap, shift, speed
+            store(contact.carried, carried)
             store(contact.normal, normal)
             if kind != FACE:
                 store(contact.pivot, plus(position, -distance, normal))
                 if kind == EDGE:
-                    store(contact.edge, row(solid.axes, axis))
+                    store(contact.edge, edge_direction(solids, solid, axis))
             contact.friction, contact.dilatancy = solid.friction, solid.dilatancy
             contact.elasticity, contact.reversal = solid.elasticity, solid.reversal
             count += 1
@@ -143,13 +147,14 @@ def weld(work: Record, count: int, radius: float) -> int:
         for j in range(count):
             b = work.contact[j]
             # Planes that move along themselves stay what they are to what lies in them.
-            if i == j or b.normal[2] * (a.rise - b.rise) != 0.0:
+            apart = sub(vector(a.carried), vector(b.carried))
+            if i == j or dot(vector(b.normal), apart) != 0.0:
                 continue
             cosine = dot(vector(a.normal), vector(b.normal))
             if b.kind == FACE and a.kind != FACE:
                 over = (radius + b.gap) - (radius + a.gap) * cosine
                 inner = inner or abs(over) < WELD_M
-            elif a.rise == b.rise and a.kind == b.kind and cosine > 1.0 - 1e-12:
+            elif dot(apart, apart) == 0.0 and a.kind == b.kind and cosine > 1.0 - 1e-12:
                 inner = inner or a.gap > b.gap or (a.gap == b.gap and j < i)
         if inner:
             count -= 1

@@ -6,11 +6,12 @@ import math
 from typing import Any, Final
 
 from roller_env.arrays import Float64, Int64
-from roller_env.physics.rigid.closest import from_centre, local
+from roller_env.physics.rigid.closest import from_centre, is_hull, local
 from roller_env.physics.rigid.kernels import (
     Record,
     Vector,
     add,
+    dot,
     entry,
     inlined,
     kernel,
@@ -18,7 +19,7 @@ from roller_env.physics.rigid.kernels import (
     row,
     vector,
 )
-from roller_env.physics.rigid.scene import MARGIN_M, Scenes
+from roller_env.physics.rigid.scene import MARGIN_M, Scenes, Solids
 from roller_env.physics.rigid.states import POSITION, SLAB
 
 _PARALLEL: Final = 1e-15
@@ -86,11 +87,11 @@ def _first(
         if 0 <= x < level.grid[0] and 0 <= y < level.grid[1]:
             cell = level.first_cell + x * level.grid[1] + y
             for place in range(scenes.cell_start[cell], scenes.cell_start[cell + 1]):
-                solid = scenes.solid[scenes.cell_solid[place]]
+                solid = scenes.solids.one[scenes.cell_solid[place]]
                 shift = body[SLAB + solid.slab] if solid.slab >= 0 else 0.0
                 if _may_meet(solid, shift, origin, direction):
                     relative = from_centre(solid, shift, origin)
-                    nearest = min(nearest, _into(solid, relative, direction))
+                    nearest = min(nearest, _into(scenes.solids, solid, relative, direction))
         middle += half
         if nearest <= middle or middle >= longest:
             break
@@ -102,23 +103,36 @@ def _first(
 def _may_meet(solid: Record, shift: float, origin: Vector, direction: Vector) -> bool:
     """Say whether a ray's bounding box meets a solid's."""
     low, high = vector(solid.low), vector(solid.high)
-    z = origin[2] - shift
+    at = origin if shift == 0.0 else plus(origin, -shift, vector(solid.along))
     return not (
-        (z < low[2] and direction[2] <= 0.0)
-        or (z > high[2] and direction[2] >= 0.0)
-        or (origin[0] < low[0] and direction[0] <= 0.0)
-        or (origin[0] > high[0] and direction[0] >= 0.0)
-        or (origin[1] < low[1] and direction[1] <= 0.0)
-        or (origin[1] > high[1] and direction[1] >= 0.0)
+        (at[2] < low[2] and direction[2] <= 0.0)
+        or (at[2] > high[2] and direction[2] >= 0.0)
+        or (at[0] < low[0] and direction[0] <= 0.0)
+        or (at[0] > high[0] and direction[0] >= 0.0)
+        or (at[1] < low[1] and direction[1] <= 0.0)
+        or (at[1] > high[1] and direction[1] >= 0.0)
     )
 
 
 @kernel
-def _into(solid: Record, from_middle: Vector, direction: Vector) -> float:
-    """Return how far it is to the surface of a box, ``inf`` if the ray misses it."""
+def _into(solids: Solids, solid: Record, from_middle: Vector, direction: Vector) -> float:
+    """Return how far it is to the surface of a solid, ``inf`` if the ray misses it."""
+    enters, leaves = -math.inf, math.inf
+    if is_hull(solid):
+        for number in range(solid.faces, solid.edges):
+            face = solids.feature[number]
+            normal = vector(face.direction)
+            height, rate = dot(normal, from_middle) - face.offset, dot(normal, direction)
+            if abs(rate) < _PARALLEL:
+                if height > 0.0:
+                    return math.inf
+            elif rate < 0.0:
+                enters = max(enters, -height / rate)
+            else:
+                leaves = min(leaves, -height / rate)
+        return _first_of(enters, leaves)
     at, way = local(solid, from_middle), local(solid, direction)
     half = vector(solid.half)
-    enters, leaves = -math.inf, math.inf
     for k in range(3):
         if abs(way[k]) < _PARALLEL:
             if abs(at[k]) > half[k]:
@@ -126,6 +140,12 @@ def _into(solid: Record, from_middle: Vector, direction: Vector) -> float:
             continue
         one, other = (-half[k] - at[k]) / way[k], (half[k] - at[k]) / way[k]
         enters, leaves = max(enters, min(one, other)), min(leaves, max(one, other))
+    return _first_of(enters, leaves)
+
+
+@kernel
+def _first_of(enters: float, leaves: float) -> float:
+    """Return how far it is to where a ray enters a solid, or from inside to where it leaves it."""
     if enters > leaves or leaves < 0.0:
         return math.inf
     return enters if enters >= 0.0 else leaves

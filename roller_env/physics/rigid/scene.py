@@ -7,16 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from roller_env.arrays import Float64, Int64
+from roller_env.physics.rigid.hull import Hull, hull_of
 from roller_env.physics.rigid.kernels import Records
 from roller_env.physics.rigid.law import COULOMB, ContactLaw
 
 Int32 = npt.NDArray[np.int32]
+
+UPWARDS: Final = (0.0, 0.0, 1.0)
 
 STATIC: Final = -1
 """Slab index of a solid that stands still."""
@@ -37,8 +40,12 @@ MOST_NEAR: Final = 512
 SOLID: Final = np.dtype(
     [
         ("centre", np.float64, 3),  # of a slab where it is before it moves
-        ("half", np.float64, 3),  # half edges
+        ("half", np.float64, 3),  # half edges of a box
         ("axes", np.float64, (3, 3)),  # row k: the box's axis k in the world
+        ("faces", np.int64),  # of a hull: its faces in `Solids.feature` begin here
+        ("edges", np.int64),  # and its edges here
+        ("corners", np.int64),  # and its corners
+        ("end", np.int64),  # and here they end; 0 of a box
         ("low", np.float64, 3),  # bounding box, of a slab before it moves
         ("high", np.float64, 3),
         ("friction", np.float64),
@@ -46,11 +53,26 @@ SOLID: Final = np.dtype(
         ("reversal", np.float64),  # tangential restitution
         ("dilatancy", np.float64),  # v_n / |u| where the ball slips on it
         ("slab", np.int64),  # which slab of its level it is, or `STATIC`
+        ("along", np.float64, 3),  # direction in which that one's displacement counts
         ("aligned", np.int64),  # 1 if its axes are the world's
     ],
     align=True,
 )
-"""A box that a ball can meet. SI units, world frame."""
+"""A box or hull that a ball can meet. SI units, world frame."""
+
+FEATURE: Final = np.dtype(
+    [
+        ("point", np.float64, 3),  # of it, from the solid's centre
+        ("direction", np.float64, 3),  # of a face its normal, of an edge along it
+        ("offset", np.float64),  # of a face: along its normal
+        ("length", np.float64),  # of an edge
+        ("ends", np.int64, 2),  # of an edge: its corners
+        ("bounds", np.int64),  # of its region in `Solids.bound` begin here
+        ("end", np.int64),  # and end here
+    ],
+    align=True,
+)
+"""A face, edge or corner of a hull; see `roller_env.physics.rigid.hull.Feature`."""
 
 LEVEL: Final = np.dtype(
     [
@@ -90,54 +112,84 @@ class SolidBox:
 
 
 @dataclass(frozen=True, slots=True)
+class SolidHull:
+    """The convex hull of points, for the ball to meet.
+
+    Attributes:
+        points: (n, 3) metres, world frame; of a slab where they are before it moves. They span a
+            volume.
+        friction: Coulomb's coefficient of the ball on it.
+        elasticity: Newton's coefficient of restitution of the ball on it.
+        slab: index of the slab that it is, or `STATIC`.
+    """
+
+    points: Sequence[Sequence[float]]
+    friction: float = 0.3
+    elasticity: float = 0.0
+    slab: int = STATIC
+
+
+@dataclass(frozen=True, slots=True)
 class RigidLevel:
     """A ball and what it can meet.
 
     Attributes:
-        boxes: solids, overlapping as they like.
+        solids: overlapping as they like.
         radius: of the ball, metres.
         gravity: m/s^2, downwards.
         mass: of the ball, kg.
         law: of all its contacts.
-        slab_stop: (P,) the displacement, metres, <= 0, at which each slab is down. It stands
+        slab_stop: (P,) the displacement, metres, <= 0, at which each slab is at its end. It stands
             between there and 0, where it is before it moves.
+        slab_along: (P, 3) unit vectors along which displacements count; upwards, if there are none.
     """
 
-    boxes: Sequence[SolidBox]
+    solids: Sequence[SolidBox | SolidHull]
     radius: float
     gravity: float
     mass: float = 1.0
     slab_stop: Sequence[float] = ()
+    slab_along: Sequence[Sequence[float]] = ()
     law: ContactLaw = COULOMB
 
 
+class Solids(NamedTuple):
+    """B solids, and the features of those that are hulls. SI units, world frame."""
+
+    one: Records  # (B,) of `SOLID`, one level after the other
+    feature: Records  # (F,) of `FEATURE`: of each hull its faces, its edges, its corners
+    bound: Float64  # (K, 4) half-spaces: `a[:3] @ p <= a[3]`, p from the solid's centre
+
+
 class Scenes(NamedTuple):
-    """L levels with B boxes in all, as compiled code takes them. SI units, world frame."""
+    """L levels with B solids in all, as compiled code takes them. SI units, world frame."""
 
     level: Records  # (L,) of `LEVEL`
-    solid: Records  # (B,) of `SOLID`, one level after the other
-    slab_stop: Float64  # (L, P) displacement at which a slab is down, <= 0; 0 for none
-    cell_start: Int64  # (cells + 1,) where each cell's boxes begin in `cell_solid`
-    cell_solid: Int32  # boxes of all cells, one cell after the other
+    solids: Solids
+    slab_stop: Float64  # (L, P) displacement at which a slab is at its end, <= 0; 0 for none
+    cell_start: Int64  # (cells + 1,) where each cell's solids begin in `cell_solid`
+    cell_solid: Int32  # solids of all cells, one cell after the other
 
 
 def pack(levels: Sequence[RigidLevel]) -> Scenes:
     """Return the levels as arrays.
 
     Raises:
-        ValueError: a box names a slab that its level does not have, or more boxes than `MOST_NEAR`
-            lie in one place.
+        ValueError: a solid names a slab that its level does not have, the points of a hull span no
+            volume, or more solids than `MOST_NEAR` lie in one place.
     """
     level = np.zeros(len(levels), LEVEL).view(np.recarray)
     slab_stop = np.zeros((len(levels), max((len(each.slab_stop) for each in levels), default=0)))
     solids, starts, lists = [], [np.zeros(1, dtype=np.int64)], []
-    boxes = cells = entries = 0
+    features = _Features()
+    count = cells = entries = 0
     for number, each in enumerate(levels):
-        solid = _solids(each, number)
-        cell, origin, grid, start, found = _grid(solid, each.radius + MARGIN_M)
+        solid = _solids(each, number, features)
+        way = np.append(np.asarray(each.slab_stop), 0.0)[solid["slab"]]  # 0 of what stands still
+        cell, origin, grid, start, found = _grid(solid, way, each.radius + MARGIN_M)
         if len(start) > 1 and np.diff(start).max() > MOST_NEAR:
             raise ValueError(
-                f"levels[{number}]: found {np.diff(start).max()} boxes within {MARGIN_M:g} m of a "
+                f"levels[{number}]: found {np.diff(start).max()} solids within {MARGIN_M:g} m of a "
                 f"square of {cell:g} m; at most {MOST_NEAR} can be there"
             )
         slab_stop[number, : len(each.slab_stop)] = each.slab_stop
@@ -153,49 +205,99 @@ def pack(levels: Sequence[RigidLevel]) -> Scenes:
         )
         solids.append(solid)
         starts.append(start[1:] + entries)
-        lists.append(found + boxes)
-        boxes, cells, entries = boxes + len(solid), cells + len(start) - 1, entries + len(found)
+        lists.append(found + count)
+        count, cells, entries = count + len(solid), cells + len(start) - 1, entries + len(found)
     return Scenes(
         level=level,
-        solid=np.concatenate([*solids, np.zeros(0, SOLID)]).view(np.recarray),
+        solids=Solids(
+            one=np.concatenate([*solids, np.zeros(0, SOLID)]).view(np.recarray),
+            feature=features.packed(),
+            bound=np.concatenate([*features.bounds, np.zeros((0, 4))]),
+        ),
         slab_stop=slab_stop,
         cell_start=np.concatenate(starts),
         cell_solid=np.concatenate([*lists, np.zeros(0, np.int64)]).astype(np.int32),
     )
 
 
-def _solids(level: RigidLevel, number: int) -> Records:
-    """Return a level's boxes."""
-    boxes = level.boxes
-    slab = np.array([box.slab for box in boxes], dtype=np.int64)
+class _Features:
+    """Collects the features of hulls."""
+
+    def __init__(self) -> None:
+        self.bounds: list[Float64] = []
+        self._rows: list[tuple[Any, ...]] = []
+        self._bounds = 0
+
+    def add(self, hull: Hull) -> tuple[int, int, int, int]:
+        """Add a hull's features; return where its faces, edges and corners begin, and the end."""
+        faces = len(self._rows)
+        edges, corners = faces + len(hull.faces), faces + len(hull.faces) + len(hull.edges)
+        for feature in (*hull.faces, *hull.edges, *hull.corners):
+            first, self._bounds = self._bounds, self._bounds + len(feature.bounds)
+            self.bounds.append(feature.bounds)
+            offset = feature.direction @ feature.point
+            ends = [corners + end for end in feature.ends]
+            row = feature.point, feature.direction, offset, feature.length, ends
+            self._rows.append((*row, first, self._bounds))
+        return faces, edges, corners, len(self._rows)
+
+    def packed(self) -> Records:
+        """Return all of them, (F,) of `FEATURE`."""
+        return np.array(self._rows, FEATURE).view(np.recarray)
+
+
+def _solids(level: RigidLevel, number: int, features: _Features) -> Records:
+    """Return a level's solids, and collect the features of its hulls."""
+    slab = np.array([each.slab for each in level.solids], dtype=np.int64)
     if len(slab) and (slab.max() >= len(level.slab_stop) or slab.min() < STATIC):
         raise ValueError(
-            f"levels[{number}].boxes: found slab {slab.min()} to {slab.max()}; must be {STATIC} to "
-            f"{len(level.slab_stop) - 1}"
+            f"levels[{number}].solids: found slab {slab.min()} to {slab.max()}; must be {STATIC} "
+            f"to {len(level.slab_stop) - 1}"
         )
+    solid = np.zeros(len(level.solids), SOLID)
+    _write_boxes(solid, level.solids)
+    for place, each in enumerate(level.solids):
+        if isinstance(each, SolidHull):
+            hull = hull_of(each.points)
+            corners = hull.centre + np.array([corner.point for corner in hull.corners])
+            solid["centre"][place] = hull.centre
+            solid["low"][place], solid["high"][place] = corners.min(axis=0), corners.max(axis=0)
+            for name, value in zip(
+                ("faces", "edges", "corners", "end"), features.add(hull), strict=True
+            ):
+                solid[name][place] = value
+    solid["friction"] = [each.friction for each in level.solids]
+    solid["elasticity"] = [level.law.restitution(each.elasticity) for each in level.solids]
+    solid["reversal"] = [level.law.tangential_restitution(each.elasticity) for each in level.solids]
+    solid["dilatancy"] = level.law.dilatancy * solid["friction"]
+    solid["slab"] = slab
+    along = np.asarray(level.slab_along or [UPWARDS] * len(level.slab_stop), dtype=np.float64)
+    solid["along"][slab >= 0] = along.reshape(-1, 3)[slab[slab >= 0]]
+    return solid
+
+
+def _write_boxes(solid: Records, solids: Sequence[SolidBox | SolidHull]) -> None:
+    """Write the shapes of those that are boxes."""
+    places = [place for place, each in enumerate(solids) if isinstance(each, SolidBox)]
+    boxes = [each for each in solids if isinstance(each, SolidBox)]
     centre = np.array([box.centre for box in boxes], dtype=np.float64).reshape(-1, 3)
     half = np.array([box.half_size for box in boxes], dtype=np.float64).reshape(-1, 3)
     rotation = np.array([box.rotation for box in boxes], dtype=np.float64).reshape(-1, 3, 3)
     extent = np.einsum("bij,bj->bi", np.abs(rotation), half)
-    solid = np.zeros(len(boxes), SOLID)
-    solid["centre"], solid["half"] = centre, half
-    solid["axes"] = rotation.transpose(0, 2, 1)
-    solid["low"], solid["high"] = centre - extent, centre + extent
-    solid["friction"] = [box.friction for box in boxes]
-    solid["elasticity"] = [level.law.restitution(box.elasticity) for box in boxes]
-    solid["reversal"] = [level.law.tangential_restitution(box.elasticity) for box in boxes]
-    solid["dilatancy"] = level.law.dilatancy * solid["friction"]
-    solid["slab"] = slab
-    solid["aligned"] = (rotation == np.eye(3)).all(axis=(1, 2))
-    return solid
+    solid["centre"][places], solid["half"][places] = centre, half
+    solid["axes"][places] = rotation.transpose(0, 2, 1)
+    solid["low"][places], solid["high"][places] = centre - extent, centre + extent
+    solid["aligned"][places] = (rotation == np.eye(3)).all(axis=(1, 2))
 
 
-def _grid(solid: Records, reach: float) -> tuple[float, Float64, Int64, Int64, Int64]:
-    """Return cell edge, origin, numbers of cells, and each cell's boxes."""
+def _grid(solid: Records, way: Float64, reach: float) -> tuple[float, Float64, Int64, Int64, Int64]:
+    """Return cell edge, origin, numbers of cells, and each cell's solids, wherever they move to."""
     if len(solid) == 0:
         empty = np.zeros(2, dtype=np.int64)
         return CELL_M, np.zeros(2), empty, np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    low, high = solid["low"][:, :2], solid["high"][:, :2]
+    moved = way[:, None] * solid["along"][:, :2]
+    low = solid["low"][:, :2] + np.minimum(moved, 0.0)
+    high = solid["high"][:, :2] + np.maximum(moved, 0.0)
     origin = low.min(axis=0) - reach
     span = high.max(axis=0) + reach - origin
     cell = max(CELL_M, float(np.sqrt(span.prod() / MOST_CELLS)))

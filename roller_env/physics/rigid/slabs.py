@@ -1,4 +1,4 @@
-"""Slabs: solids that move along z at a given velocity, between their stop and where they began."""
+"""Slabs: solids that move along a line at a given speed, between its end and where they began."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ class States(NamedTuple):
     force: Float64  # (N, 3) newtons on the centre besides gravity, during the next step
     delay: Float64  # (N,) seconds for which the next step leaves ball and slabs alone; it ends that
     slab: Float64  # (N, P) displacement of each slab along z, <= 0
-    slab_velocity: Float64  # (N, P) m/s along z at which each slab is to move in the next step
+    slab_velocity: Float64  # (N, P) m/s along its line at which each slab is to move in a step
 
 
 class Counts(NamedTuple):

@@ -64,7 +64,7 @@ from roller_env.physics.rigid.motion import (
 )
 from roller_env.physics.rigid.near import gather, look_ahead, time_within, touch, weld
 from roller_env.physics.rigid.path import begin, bend_through, follow
-from roller_env.physics.rigid.scene import MARGIN_M, Scenes
+from roller_env.physics.rigid.scene import MARGIN_M, Scenes, Solids
 from roller_env.physics.rigid.slabs import move_slabs, set_going, time_to_stop
 from roller_env.physics.rigid.states import (
     DELAY,
@@ -186,7 +186,7 @@ def _advance_ball(
 
     Its orientation is turned in place.
     """
-    radius, solids = level.radius, scenes.solid
+    radius, solids = level.radius, scenes.solids
     knots = begin(path, ball.position)
     time = delay
     centre, listed = ball.position, -1.0  # what is listed as near is so around this place
@@ -282,7 +282,7 @@ def _between(
 def _meet(
     work: Record,
     slabs: Records,
-    solids: Records,
+    solids: Solids,
     count: int,
     radius: float,
     ball: Ball,
@@ -307,9 +307,11 @@ def _meet(
     if blocked > 0:
         work.blocked += blocked
         for place in range(work.found):
-            slab = solids[work.near[place].solid].slab
+            slab = solids.one[work.near[place].solid].slab
             if slab >= 0:
-                work.near[place].rise = slabs[slab].speed
+                work.near[place].speed = slabs[slab].speed
+                moves = scaled(slabs[slab].speed, vector(solids.one[work.near[place].solid].along))
+                store(work.near[place].carried, moves)
     count = keep_closed(work, count, twist.linear)
     twist = settle(work, count, radius, twist)
     return count, Ball(p, twist.linear, twist.angular)
@@ -318,7 +320,7 @@ def _meet(
 @inlined
 def _plan(
     work: Record,
-    solids: Records,
+    solids: Solids,
     motion: Motion,
     radius: float,
     ball: Ball,
@@ -372,7 +374,7 @@ def _through(ball: Ball, there: Vector, time: float) -> Vector:
 @inlined
 def _until(
     work: Record,
-    solids: Records,
+    solids: Solids,
     motion: Motion,
     radius: float,
     ball: Ball,
@@ -404,7 +406,7 @@ def _until(
 @inlined
 def _move(
     work: Record,
-    solids: Records,
+    solids: Solids,
     motion: Motion,
     radius: float,
     ball: Ball,

@@ -24,8 +24,9 @@ CONTACT: Final = np.dtype(
         ("elasticity", np.float64),
         ("reversal", np.float64),
         ("dilatancy", np.float64),
-        ("shift", np.float64),  # displacement of the solid along z
-        ("rise", np.float64),  # velocity of the solid along z
+        ("shift", np.float64),  # displacement of the solid along its line
+        ("speed", np.float64),  # the same of its velocity
+        ("carried", np.float64, 3),  # that velocity in the world
         # The problem of impulses or forces:
         ("surface", np.float64, 3),  # what the slip is measured against: s
         ("bias", np.float64),  # b
@@ -51,7 +52,8 @@ NEAR: Final = np.dtype(
         ("gap", np.float64),
         ("normal", np.float64, 3),
         ("shift", np.float64),
-        ("rise", np.float64),
+        ("speed", np.float64),
+        ("carried", np.float64, 3),
     ],
     align=True,
 )
@@ -59,9 +61,9 @@ NEAR: Final = np.dtype(
 
 SLAB: Final = np.dtype(
     [
-        ("shift", np.float64),  # displacement along z
-        ("speed", np.float64),  # along z
-        ("stop", np.float64),  # displacement at which it is down
+        ("shift", np.float64),  # displacement along its line
+        ("speed", np.float64),  # of that
+        ("stop", np.float64),  # displacement at its end
     ],
     align=True,
 )

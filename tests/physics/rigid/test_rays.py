@@ -24,7 +24,7 @@ def test_rays_among_packed_levels_meet_what_those_of_mujoco_meet(number: int) ->
     compiled = compile_level(levels[number][0], "default")
     stepper = Stepper(compiled.model, BALLS, 1, 1)
     states = make_states(scenes, BALLS)
-    low, high = (f(scenes.solid[k], axis=0) for f, k in ((np.min, "low"), (np.max, "high")))
+    low, high = (f(scenes.solids.one[k], axis=0) for f, k in ((np.min, "low"), (np.max, "high")))
     states.position[:] = generator.uniform(low - 3.0, high + 3.0, (BALLS, 3))
     stop = scenes.slab_stop[number]
     states.slab[:] = generator.uniform(0.0, 1.0, (BALLS, len(stop))) * stop

@@ -83,7 +83,7 @@ def test_a_slab_goes_up_again_and_stops_where_it_began() -> None:
 
 def test_more_boxes_in_one_place_than_can_be_listed_are_refused() -> None:
     boxes = [SolidBox((0.0, 0.0, 0.0), (0.5, 0.5, 0.5))] * (MOST_NEAR + 1)
-    with pytest.raises(ValueError, match=rf"levels\[0\]: found {MOST_NEAR + 1} boxes"):
+    with pytest.raises(ValueError, match=rf"levels\[0\]: found {MOST_NEAR + 1} solids"):
         pack([RigidLevel(boxes, RADIUS_M, GRAVITY)])
 
 

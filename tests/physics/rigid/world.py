@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from roller_env.physics.rigid.law import COULOMB, ContactLaw
-from roller_env.physics.rigid.scene import RigidLevel, Scenes, SolidBox, pack
+from roller_env.physics.rigid.scene import RigidLevel, Scenes, SolidBox, SolidHull, pack
 from roller_env.physics.rigid.states import States, make_counts, make_states
 from roller_env.physics.rigid.step import advance
 from roller_env.physics.rigid.workspace import make_workspace
@@ -55,15 +55,24 @@ class World:
 
     def __init__(
         self,
-        boxes: Sequence[SolidBox],
+        boxes: Sequence[SolidBox | SolidHull],
         count: int = 1,
         *,
         slab_stop: Sequence[float] = (),
+        slab_along: Sequence[Sequence[float]] = (),
         cap_s: float = CAP_S,
         law: ContactLaw = COULOMB,
         mass_kg: float = 1.0,
     ):
-        level = RigidLevel(boxes, RADIUS_M, GRAVITY, mass=mass_kg, slab_stop=slab_stop, law=law)
+        level = RigidLevel(
+            boxes,
+            RADIUS_M,
+            GRAVITY,
+            mass_kg,
+            slab_stop,
+            slab_along,
+            law,
+        )
         self.scenes: Scenes = pack([level])
         self.states = make_states(self.scenes, count)
         self.counts = make_counts(count)
@@ -146,10 +155,10 @@ class World:
     def depth(self) -> Float64:
         """Return (N,) how deep each ball is in a solid, metres; negative where it is free."""
         deepest = np.full(len(self.states.position), -np.inf)
-        for solid in self.scenes.solid:
+        for solid in self.scenes.solids.one:
             relative = self.states.position - solid.centre
             if solid.slab >= 0:
-                relative[:, 2] -= self.states.slab[:, solid.slab]
+                relative -= self.states.slab[:, solid.slab, None] * solid.along
             local = relative @ solid.axes.T
             half = solid.half
             outside = np.linalg.norm(np.maximum(np.abs(local) - half, 0.0), axis=1)
