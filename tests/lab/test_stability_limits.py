@@ -32,6 +32,9 @@ from roller_env.rigid_body import INTEGRATORS, Integrator
 DIFFER = {"speculative_exactly_touching"}
 """Where MuJoCo does not do what its manual says; the case's note has the reason."""
 
+DEPART = {"bounce_rk4_4ms", "bounce_discrete_1ms"}
+"""Where the formula is of a spring, and the method is not: the bands are of what it does."""
+
 QUICK_CASES = [name for name, words in WORDS.items() if words["quick"]]
 
 
@@ -43,7 +46,7 @@ def test_every_limit_is_measured_and_has_words() -> None:
 @pytest.mark.parametrize("name", QUICK_CASES)
 def test_a_limit_is_where_its_formula_puts_it(name: str) -> None:
     row = judged(name, CASES[name], QUICK)
-    expected = "differs" if name in DIFFER else "holds"
+    expected = "differs" if name in DIFFER else "departs" if name in DEPART else "holds"
     assert row["verdict"] == expected, (row["measured"], row["predicted"])
 
 

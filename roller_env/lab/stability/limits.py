@@ -115,11 +115,15 @@ Case = Quantity | Limit
 def judged(name: str, case: Case, effort: Effort) -> dict[str, Any]:
     """Measure a case and return a row: its `WORDS`, ``predicted``, ``measured``, their ``ratio``.
 
-    And the ``verdict`` (holds or differs), and whether that is ``good``.
+    And the ``verdict``: it holds; it departs, as the ``note`` says, where the band is one that the
+    prediction is not in; or it differs. And whether that is ``good``; and whether the value was
+    ``bisected``, or is what one measurement says.
     """
     row = WORDS[name] | {"case": name, "predicted": case.predicted, "tolerance": effort.tolerance}
     row["measured"] = measured = case.measure(effort, row["searched_to"])
     limited = math.isfinite(case.predicted)
     row["ratio"] = ratio = measured / case.predicted if limited else math.nan
     row["good"] = row["low"] <= ratio <= row["high"] if limited else math.isinf(measured)
-    return row | {"verdict": "holds" if row["good"] else "differs"}
+    row["bisected"] = isinstance(case, Limit)
+    departs = limited and not row["low"] <= 1.0 <= row["high"]
+    return row | {"verdict": "differs" if not row["good"] else "departs" if departs else "holds"}

@@ -100,7 +100,7 @@ def summary(results: Results) -> Iterator[str]:
     """Yield one line a section: how many held, and the names of those that did not."""
     for section, table in results.tables.items():
         said, label = {
-            "limits": ("predictions hold", "{case}"),
+            "limits": ("limits are as expected", "{case}"),
             "failures": ("failures and cures are as expected", "{case}: {setting}"),
             "hard_cases": (
                 "readings of hard cases are acceptable",
@@ -109,6 +109,10 @@ def summary(results: Results) -> Iterator[str]:
         }[section]
         odd = [label.format(**row) for row in table[~table.good].to_dict("records")]
         line = f"{len(table) - len(odd)} of {len(table)} {said}"
+        if section == "limits":
+            holds, departs = ((table.verdict == verdict).sum() for verdict in ("holds", "departs"))
+            line += f" ({holds} as predicted, {departs} known to depart; "
+            line += f"{table.bisected.sum()} by bisection, the others by one measurement)"
         yield line + (f"; not: {', '.join(odd)}" if odd else "")
 
 
