@@ -31,6 +31,7 @@ from roller_env.pieces.gate import GATE
 from roller_env.pieces.piece import Solid
 from roller_env.pieces.plate import PLATE
 from roller_env.pieces.rules import Rules
+from roller_env.workers import Workers
 
 
 def make_physics(
@@ -204,6 +205,8 @@ class Simulation:
         self._measure = Bound(step.measure, games.concluding, physics, self._at, self._rewarding)
         self._observe = Bound(step.observe, games.showing, physics, self._at)
         self._every = np.arange(num_envs)
+        self._parts = [self._every[part] for part in self._physics.parts]
+        self._workers = Workers()
         self._ray_directions = observations.ray_directions()
         self._scan_offsets = observations.scan_offsets()
 
@@ -464,16 +467,32 @@ class Simulation:
 
     def _step_rows(self, rows: Int64 | None, force_n: Float64) -> None:
         """Step ``rows``; None: all."""
-        every: Int64 | slice = slice(None) if rows is None else rows
-        envs = self._every if rows is None else rows
-        self._prepare(envs, force_n)
-        before = self._physics.state[every].copy()
-        hanging = self._games.hanging_s[every]
-        path = self._let_go(rows, hanging) if hanging.any() else self._physics.advance(rows)
-        diverged = self._physics.diverged()[every]
-        if diverged.any():
+        lost: list[tuple[Int64, Path, Bool, Float64]] = []
+
+        def advance(envs: Int64) -> None:
+            worlds = None if len(envs) == self.num_envs else envs
+            self._prepare(envs, force_n)
+            before = self._physics.state[slice(None) if worlds is None else worlds].copy()
+            hanging = self._games.hanging_s[envs]
+            path = self._let_go(worlds, hanging) if hanging.any() else self._physics.advance(worlds)
+            diverged = self._physics.diverged(worlds)
+            if diverged.any():
+                lost.append((envs, path, diverged, before))
+            else:
+                self._conclude(envs, path.at, path.knots)
+
+        self._workers.share(advance, self._shares(rows))
+        for envs, path, diverged, before in sorted(lost, key=lambda one: int(one[0][0])):
             self._end_diverged(envs[diverged], path, diverged, before)
-        self._conclude(envs, path.at, path.knots)
+            self._conclude(envs, path.at, path.knots)
+
+    def _shares(self, rows: Int64 | None) -> list[Int64]:
+        """Return ``rows``, sorted (all, if None), by the parts of the physics; at least one."""
+        if rows is None:
+            return self._parts
+        ends = [part.start for part in self._physics.parts[1:]]
+        shares = np.split(rows, np.searchsorted(rows, ends))
+        return [share for share in shares if len(share)] or [rows]
 
     def _let_go(self, rows: Int64 | None, hanging_s: Float64) -> Path:
         """Advance rows of which some begin to move only after ``hanging_s``, (n,); return paths."""
@@ -525,9 +544,19 @@ class Simulation:
         envs = self._every if rows is None else np.asarray(rows)
         size = sum(entry.size for entry in observations.entries(self.config.observation))
         out = np.zeros((len(envs), size), dtype=np.float32)
-        self._observe(envs, out)
-        if self.config.observation == "rays":
-            out[:, observations.STATE_SIZE :] = self._cast_rays(rows, envs)
+        rays = self.config.observation == "rays"
+
+        def show(share: slice) -> None:
+            self._observe(envs[share], out[share])
+            if rays:
+                whole = rows is None and len(envs[share]) == self.num_envs
+                seen = self._cast_rays(None if whole else envs[share], envs[share])
+                out[share, observations.STATE_SIZE :] = seen
+
+        size = -(-len(envs) // len(self._parts)) or 1
+        self._workers.share(
+            show, [slice(first, first + size) for first in range(0, max(len(envs), 1), size)]
+        )
         return out
 
     def _cast_rays(self, rows: Int64 | None, envs: Int64) -> Float32:

@@ -38,7 +38,7 @@ class Arguments:
     """Name of a shipped level, or the path of a level file."""
 
     physics: str = "default"
-    """Preset of the physics: fast, default or accurate."""
+    """Preset of MuJoCo: fast, default or accurate; the rigid engine is beside it in every run."""
 
     reward: Literal["points", "shaped"] = "shaped"
     """The dearer of the two, unless told otherwise."""

@@ -21,6 +21,8 @@ class MujocoPhysics:
         self._stepper = Stepper(compiled.model, num_envs, substeps, num_threads)
         self.state = self._stepper.state
         self.columns = self._columns(compiled)
+        # MuJoCo's threads are its own.
+        self.parts = [slice(0, num_envs)]
 
     def _columns(self, compiled: CompiledLevel) -> Columns:
         """Return where things are in MuJoCo's integration state.
@@ -60,10 +62,10 @@ class MujocoPhysics:
     def _straight(self, places: Float64) -> Path:
         return Path(places, self._knots[: len(places)])
 
-    def diverged(self) -> Bool:
-        """Say which worlds, (N,), MuJoCo has warned of, or are not finite."""
+    def diverged(self, worlds: Int64 | None) -> Bool:
+        """Say which worlds MuJoCo has warned of, or are not finite."""
         lost: Bool = self._stepper.diverged() | ~np.isfinite(self._stepper.qpos).all(axis=1)
-        return lost
+        return lost if worlds is None else lost[worlds]
 
     def rays(
         self, offsets: Float64, directions: Float64, longest: float, worlds: Int64 | None

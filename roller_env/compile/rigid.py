@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -41,8 +40,8 @@ KNOTS = 24
 KNOTS_A_CAP = 4
 """Room for the knots of a path: so many, and so many more for each time of the cap in a step."""
 
-WORLDS_A_THREAD = 32
-"""Fewer are not worth a thread of their own."""
+WORLDS_A_THREAD = 512
+"""Fewer are not worth a thread of their own: they would wait for each other in Python."""
 
 
 def rigid_level(level: Level, law: ContactLaw = COULOMB) -> RigidLevel:
@@ -115,14 +114,18 @@ class RigidPhysics:
         )
         self._worlds = make_states(self._scenes, num_envs)
         self.state: Float64 = self._worlds.packed
-        self._threads = min(num_threads or os.cpu_count() or 1, -(-num_envs // WORLDS_A_THREAD))
+        threads = min(num_threads or os.cpu_count() or 1, -(-num_envs // WORLDS_A_THREAD))
+        self._part_size = -(-num_envs // threads)
+        self.parts = [
+            slice(first, min(first + self._part_size, num_envs))
+            for first in range(0, num_envs, self._part_size)
+        ]
         self._level_of = np.zeros(num_envs, dtype=np.int64)
         self._every = np.arange(num_envs)
         self._counts = make_counts(num_envs)
-        self._workspace = make_workspace(self._scenes, self._threads)
+        self._workspace = make_workspace(self._scenes, len(self.parts))
         most = KNOTS + math.ceil(KNOTS_A_CAP * duration_s / CAP_S)
         self._path = Path(np.zeros((num_envs, most, 6)), np.zeros(num_envs, dtype=np.int64))
-        self._pool: tuple[int, ThreadPoolExecutor] | None = None
         self.reset(self._every)
 
     def reset(self, worlds: Int64) -> None:
@@ -134,13 +137,22 @@ class RigidPhysics:
     def advance(self, worlds: Int64 | None) -> Path:
         """Advance worlds (all, if None), and return their balls' ways."""
         rows = self._every if worlds is None else worlds
-        path = Path(self._path.at[: len(rows)], self._path.knots[: len(rows)])
-        threads = min(self._threads, -(-len(rows) // WORLDS_A_THREAD))
-        if threads <= 1:
-            self._advance_some(rows, path.at, path.knots, 0)
-        else:
-            parts = (np.array_split(each, threads) for each in (rows, *path))
-            list(self._ready_pool().map(self._advance_some, *parts, range(threads)))
+        part = int(rows[0]) // self._part_size
+        # Worlds of a part have room where the part begins, as all have together.
+        room = slice(part * self._part_size, part * self._part_size + len(rows))
+        path = Path(self._path.at[room], self._path.knots[room])
+        advance(
+            self._scenes,
+            self._level_of,
+            self.state,
+            rows,
+            self._duration_s,
+            CAP_S,
+            *path,
+            self._counts,
+            self._workspace,
+            part,
+        )
         return path
 
     def advance_late(self, worlds: Int64 | None, still: Int64) -> Path:
@@ -149,9 +161,10 @@ class RigidPhysics:
         self._worlds.delay[rows] = still * (self._duration_s / self.substeps)
         return self.advance(worlds)
 
-    def diverged(self) -> Bool:
+    def diverged(self, worlds: Int64 | None) -> Bool:
         """Say which worlds are no longer finite, or larger than anything in a game can be."""
-        return np.logical_not((np.abs(self.state) <= LARGEST).all(axis=1))
+        state = self.state if worlds is None else self.state[worlds]
+        return np.logical_not((np.abs(state) <= LARGEST).all(axis=1))
 
     def rays(
         self, offsets: Float64, directions: Float64, longest: float, worlds: Int64 | None
@@ -163,24 +176,3 @@ class RigidPhysics:
             self._scenes, self._level_of, self.state, rows, offsets, directions, longest, found
         )
         return found
-
-    def _advance_some(self, rows: Int64, path: Float64, knots: Int64, thread: int) -> None:
-        advance(
-            self._scenes,
-            self._level_of,
-            self.state,
-            rows,
-            self._duration_s,
-            CAP_S,
-            path,
-            knots,
-            self._counts,
-            self._workspace,
-            thread,
-        )
-
-    def _ready_pool(self) -> ThreadPoolExecutor:
-        """Return threads of this process: a fork has none of its parent's."""
-        if self._pool is None or self._pool[0] != os.getpid():
-            self._pool = os.getpid(), ThreadPoolExecutor(self._threads)
-        return self._pool[1]

@@ -96,11 +96,14 @@ class Physics(Protocol):
             written there counts from the next step on.
         columns: where everything is in it.
         substeps: steps of `advance`, S, in which `advance_late` counts.
+        parts: ranges of worlds: for worlds of one range methods may be called while they are, in
+            other threads, for worlds of others.
     """
 
     state: Float64
     columns: Columns
     substeps: int
+    parts: list[slice]
 
     def reset(self, worlds: Int64) -> None:
         """Put worlds back to where the level begins, at rest."""
@@ -108,7 +111,7 @@ class Physics(Protocol):
     def advance(self, worlds: Int64 | None) -> Path:
         """Advance worlds (all, if None) by a control step, and return where they went.
 
-        The next call overwrites it.
+        The next call for one of them overwrites it.
         """
 
     def advance_late(self, worlds: Int64 | None, still: Int64) -> Path:
@@ -119,8 +122,12 @@ class Physics(Protocol):
             still: (n,) steps at the beginning, 0 to S, in which each does not move.
         """
 
-    def diverged(self) -> Bool:
-        """Say which worlds, (N,), are not finite, or given up on since their last `reset`."""
+    def diverged(self, worlds: Int64 | None) -> Bool:
+        """Say which worlds (of all, if None) are not finite, or given up on since their `reset`.
+
+        Returns:
+            (n,) in the order of ``worlds``.
+        """
 
     def rays(
         self, offsets: Float64, directions: Float64, longest: float, worlds: Int64 | None

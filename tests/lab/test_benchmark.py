@@ -29,7 +29,7 @@ from roller_env.lab.benchmark.cases import (
 )
 from roller_env.lab.benchmark.peer_worker import serve
 from roller_env.lab.benchmark.peers import Peer, PeerError
-from roller_env.lab.benchmark.ratios import _CASES, _MANY, _TRAIN, _VECTOR, GOALS, judge
+from roller_env.lab.benchmark.ratios import CASES, GOALS, MANY, RIGID, TRAIN, VECTOR, judge
 from roller_env.lab.benchmark.scale import (
     YARD_BOXES,
     level_of_boxes,
@@ -81,12 +81,18 @@ def test_twice_the_environments_in_half_the_time_are_four_times_the_speed() -> N
 
 
 def test_goals_are_about_steps_a_second_simulated_time_or_cost() -> None:
-    wall = dict.fromkeys(_CASES, 1.0) | {_VECTOR: 0.5, _MANY: 0.9, _TRAIN: 1e-4}
-    seconds, simulated_s = frame([wall]), dict.fromkeys(_CASES, 0.01) | {_VECTOR: 0.05}
+    wall = dict.fromkeys(CASES, 1.0) | {
+        VECTOR: 0.5,
+        RIGID: 0.02,
+        MANY: 0.9,
+        TRAIN: 1e-4,
+    }
+    seconds, simulated_s = frame([wall]), dict.fromkeys(CASES, 0.01) | {RIGID: 0.05}
     found = {goal.title: goal.of(seconds, seconds / Series(simulated_s))[0] for goal in GOALS}
     assert found["whole vector step to Batch alone"] == 2.0
-    assert found["environment steps to EnvPool"] == 2.0
-    assert found["simulated time to EnvPool"] == pytest.approx(10.0)
+    assert found["rigid: whole vector step to the same of MuJoCo"] == pytest.approx(25.0)
+    assert found["rigid: environment steps to EnvPool"] == pytest.approx(50.0)
+    assert found["rigid: simulated time to EnvPool"] == pytest.approx(250.0)
     assert found["cost an environment step, 1,024 environments to 64"] == 0.9
     assert found["make train's PPO, thousand environment steps/s"] == pytest.approx(10.0)
 

@@ -15,6 +15,7 @@ import pytest
 from gymnasium.utils import env_checker
 
 from roller_env import ENV_IDS
+from roller_env.compile import rigid
 from roller_env.config import make_config
 from roller_env.level import load_level, shipped_levels
 from roller_env.replay import load_replay, record_episode, save_replay, verify
@@ -203,3 +204,43 @@ def test_a_hundred_thousand_games_fit_in_a_gigabyte() -> None:
     # process's highest use is no measure: it begins with that of the process that started it.
     printed(MANY.replace("100_000", "2"))
     assert int(printed(MANY)) < 1e9
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+@pytest.mark.parametrize("observation", ["state", "rays"])
+def test_games_shared_by_threads_have_the_bits_of_one(
+    threads: int, observation: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rigid, "WORLDS_A_THREAD", 3)
+    games = [
+        simulation_of(
+            "gate", num_envs=13, physics="rigid", observation=observation, num_threads=count
+        )
+        for count in (1, threads)
+    ]
+    held = np.zeros(13, dtype=bool)
+    held[[2, 7, 12]] = True
+    for number, force in enumerate(islice(wandering(13, 3), 60)):
+        hold = held if number % 3 == 1 else None
+        for game in games:
+            game.step(force, hold)
+        one, several = games
+        assert bits(several) == bits(one)
+        rows = np.array([11, 0, 5])
+        assert np.array_equal(several.observe(), one.observe())
+        assert np.array_equal(several.observe(rows), one.observe(rows))
+
+
+def test_a_game_that_diverges_in_one_thread_leaves_others_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(rigid, "WORLDS_A_THREAD", 2)
+    games = [simulation_of("flat", num_envs=8, physics="rigid", num_threads=n) for n in (1, 4)]
+    for game in games:
+        snapshot = game.snapshot()
+        snapshot.bodies.velocity[[1, 6]] = np.nan
+        game.restore(snapshot)
+        with pytest.warns(RuntimeWarning, match="diverged"):
+            game.step(np.zeros((8, 2)))
+        assert game.divergences == 2
+    assert bits(games[1]) == bits(games[0])

@@ -17,6 +17,8 @@ from roller_env.lab.benchmark import cases
 from roller_env.lab.benchmark.breakdown import where_the_time_goes
 from roller_env.lab.benchmark.peers import Peer
 from roller_env.lab.table import Frame, markdown
+from roller_env.physics.presets import DEFAULT, MUJOCO_PRESETS, physics_preset
+from roller_env.problems import listed
 from roller_env.training.config import TrainingConfig
 
 Sense = Literal["at least", "at most"]
@@ -24,10 +26,13 @@ Sense = Literal["at least", "at most"]
 FEW_ENVS: Final = 64
 MANY_ENVS: Final = 1024
 
-_CASES: Final = (
+CASES: Final = (
     "Roller, vector",
+    "Roller, vector, rigid",
+    "Roller, vector, rigid, rays",
     "mujoco.batch.Batch alone, same balls",
     "Roller, gym.make",
+    "Roller, gym.make, rigid",
     "mj_step loop alone, same ball",
     "EnvPool PointMaze_Large-v3",
     "gymnasium-robotics PointMaze_Large-v3",
@@ -37,8 +42,8 @@ _CASES: Final = (
     f"Roller, {FEW_ENVS} environments",
     f"Roller, {MANY_ENVS} environments",
 )
-_VECTOR, _BATCH, _SINGLE, _LOOP, _ENVPOOL, _ROBOTICS, *_OTHERS = _CASES
-_ROLLER_PPO, _SUBPROC_PPO, _TRAIN, _FEW, _MANY = _OTHERS
+VECTOR, RIGID, _RAYS, _BATCH, _SINGLE, _RIGID_SINGLE, _LOOP, *_OTHERS = CASES
+_ENVPOOL, _ROBOTICS, _ROLLER_PPO, _SUBPROC_PPO, TRAIN, _FEW, MANY = _OTHERS
 
 
 class Goal(NamedTuple):
@@ -57,22 +62,29 @@ class Goal(NamedTuple):
 _COST: Final = f"cost an environment step, {MANY_ENVS:,} environments to {FEW_ENVS}"
 _THOUSANDS: Final = "make train's PPO, thousand environment steps/s"
 _PPO: Final = "PPO on RollerVecEnv to PPO on SubprocVecEnv"
-_ROBOT: Final = "one environment to gymnasium-robotics"
+_ROBOT: Final = "rigid: one environment to gymnasium-robotics"
+_TO_DEFAULT: Final = "rigid: whole vector step to the same of MuJoCo"
 
 GOALS: Final = (
-    Goal("whole vector step to Batch alone", "at least", 0.85, lambda s, _: s[_BATCH] / s[_VECTOR]),
+    Goal("whole vector step to Batch alone", "at least", 0.85, lambda s, _: s[_BATCH] / s[VECTOR]),
     Goal(
         "one environment to a bare mj_step loop",
         "at least",
         0.35,
         lambda s, _: s[_LOOP] / s[_SINGLE],
     ),
-    Goal("simulated time to EnvPool", "at least", 8.0, lambda _, s: s[_ENVPOOL] / s[_VECTOR]),
-    Goal("environment steps to EnvPool", "at least", 2.0, lambda s, _: s[_ENVPOOL] / s[_VECTOR]),
-    Goal(_ROBOT, "at least", 1.0, lambda s, _: s[_ROBOTICS] / s[_SINGLE]),
+    Goal(_TO_DEFAULT, "at least", 25.0, lambda s, _: s[VECTOR] / s[RIGID]),
+    Goal(
+        "rigid: environment steps to EnvPool", "at least", 8.0, lambda s, _: s[_ENVPOOL] / s[RIGID]
+    ),
+    Goal("rigid: simulated time to EnvPool", "at least", 40.0, lambda _, s: s[_ENVPOOL] / s[RIGID]),
+    Goal(_ROBOT, "at least", 1.5, lambda s, _: s[_ROBOTICS] / s[_RIGID_SINGLE]),
+    Goal(
+        "rigid: cost of rays to that of a state", "at most", 2.0, lambda s, _: s[_RAYS] / s[RIGID]
+    ),
     Goal(_PPO, "at least", 4.0, lambda s, _: s[_SUBPROC_PPO] / s[_ROLLER_PPO]),
-    Goal(_COST, "at most", 1.1, lambda s, _: s[_MANY] / s[_FEW]),
-    Goal(_THOUSANDS, "at least", 20.0, lambda s, _: 1e-3 / s[_TRAIN]),
+    Goal(_COST, "at most", 1.1, lambda s, _: s[MANY] / s[_FEW]),
+    Goal(_THOUSANDS, "at least", 20.0, lambda s, _: 1e-3 / s[TRAIN]),
 )
 
 
@@ -111,20 +123,27 @@ class Task:
     peers: Path | None  # Python with the peers installed; None leaves them out
 
     def __post_init__(self) -> None:
-        """Refuse options that no environment takes."""
+        """Refuse options that no environment takes, and an engine without MuJoCo's physics."""
         cases.check_options(self.options)
+        if physics_preset(self.options.get("physics", DEFAULT)).engine != "mujoco":
+            found, known = self.options["physics"], listed(tuple(MUJOCO_PRESETS))
+            raise ValueError(
+                f"physics: found {found!r}; must be one of {known}, whose physics alone is "
+                "measured; the rigid engine is beside it in every run"
+            )
 
-    def vector(self, name: str = _VECTOR, num_envs: int = 0) -> cases.VectorStep:
+    def vector(self, name: str = VECTOR, num_envs: int = 0, **changes: Any) -> cases.VectorStep:
         """Return a vector, of many environments unless told otherwise."""
-        return cases.VectorStep(name, num_envs or self.num_envs, self.num_threads, **self.options)
+        options = {**self.options, **changes}
+        return cases.VectorStep(name, num_envs or self.num_envs, self.num_threads, **options)
 
-    def single(self) -> cases.SingleStep:
+    def single(self, name: str = _SINGLE, **changes: Any) -> cases.SingleStep:
         """Return one environment."""
-        return cases.SingleStep(_SINGLE, **self.options)
+        return cases.SingleStep(name, **{**self.options, **changes})
 
     def make_train(self) -> cases.Training:
         """Return what ``make train`` does."""
-        return cases.as_make_train_does(_TRAIN, self.training)
+        return cases.as_make_train_does(TRAIN, self.training)
 
     def _peer(self, name: str, **wanted: Any) -> list[runner.Case]:
         return [] if self.peers is None else [Peer(name, self.peers, **wanted)]
@@ -133,7 +152,7 @@ class Task:
         """Return what makes the cases of each interleaved run, by what is said of it."""
         count, threads, options = self.training_envs, self.num_threads, self.options
         sizes = {"num_envs": self.num_envs, "num_threads": threads}
-        few, many = (_FEW, FEW_ENVS), (_MANY, MANY_ENVS)
+        few, many = (_FEW, FEW_ENVS), (MANY, MANY_ENVS)
         return {
             # First, while there are no threads that a fork could cut off.
             "training: RollerVecEnv, SubprocVecEnv": lambda: [
@@ -143,11 +162,14 @@ class Task:
             "vector steps": lambda: [
                 (ours := self.vector()),
                 cases.BatchAlone(_BATCH, ours),
+                self.vector(RIGID, physics="rigid"),
+                self.vector(_RAYS, physics="rigid", observation="rays"),
                 *self._peer(_ENVPOOL, peer="envpool", **sizes),
             ],
             "one environment": lambda: [
                 (ours := self.single()),
                 cases.BareLoop(_LOOP, ours),
+                self.single(_RIGID_SINGLE, physics="rigid"),
                 *self._peer(_ROBOTICS, peer="gymnasium-robotics"),
             ],
             f"{FEW_ENVS} and {MANY_ENVS} environments": lambda: [
@@ -176,7 +198,7 @@ def measure(task: Task, say: Callable[[str], None]) -> tuple[Frame, Frame, dict[
                 simulated_s[case.name] = case.simulated_s
                 versions |= getattr(case, "versions", {})
             seconds = seconds.join(runner.compare(compared, task.config), how="outer")
-    per_s, whole = 1.0 / seconds, seconds.reindex(columns=_CASES)
+    per_s, whole = 1.0 / seconds, seconds.reindex(columns=CASES)
     goals = [judge(*one[:3], one.of(whole, whole / pd.Series(simulated_s))) for one in GOALS]
     speeds = Frame(
         {
