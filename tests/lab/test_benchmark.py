@@ -312,9 +312,9 @@ def test_the_benchmark_measures_every_goal_but_the_peers(tmp_path: Path) -> None
     assert [row["comparison"] for row in rows] == [goal.title for goal in GOALS]
     absent = [row["comparison"] for row in rows if row["verdict"] == "not measured"]
     assert absent == [
-        "simulated time to EnvPool",
-        "environment steps to EnvPool",
-        "one environment to gymnasium-robotics",
+        "rigid: environment steps to EnvPool",
+        "rigid: simulated time to EnvPool",
+        "rigid: one environment to gymnasium-robotics",
     ]
     assert all(row["measured"] > 0.0 for row in rows if row["verdict"] != "not measured")
     assert all(row["measured"] is None for row in rows if row["verdict"] == "not measured")
