@@ -69,15 +69,15 @@ class Bound(Generic[_R]):
     def __init__(self, kernel: Callable[..., _R], *fixed: Any):
         """Bind a kernel to its first arguments, arrays, numbers and tuples of them."""
         self._kernel, self._fixed = kernel, fixed
-        self._types: tuple[object, ...] | None = None
-        self._entry: Callable[..., _R] = kernel
+        self._entries: dict[tuple[object, ...], Callable[..., _R]] = {}
 
     def __call__(self, *others: Any) -> _R:
         """Call it with the arguments that are left, arrays or numbers."""
         types = tuple(map(_type_of, others))
-        if types != self._types:
-            self._entry, self._types = self._entry_for(*self._fixed, *others), types
-        return self._entry(*self._fixed, *others)
+        entry = self._entries.get(types)
+        if entry is None:
+            entry = self._entries[types] = self._entry_for(*self._fixed, *others)
+        return entry(*self._fixed, *others)
 
     def _entry_for(self, *arguments: Any) -> Callable[..., _R]:
         """Return what is called in the end."""

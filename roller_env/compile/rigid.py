@@ -9,6 +9,7 @@ import numpy as np
 
 from roller_env.arrays import Bool, Float64, Int64
 from roller_env.compile.merge import merge_solids
+from roller_env.compiled import Bound
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
 from roller_env.physics.presets import FrictionLaw
@@ -120,12 +121,15 @@ class RigidPhysics:
             slice(first, min(first + self._part_size, num_envs))
             for first in range(0, num_envs, self._part_size)
         ]
-        self._level_of = np.zeros(num_envs, dtype=np.int64)
         self._every = np.arange(num_envs)
-        self._counts = make_counts(num_envs)
-        self._workspace = make_workspace(self._scenes, len(self.parts))
         most = KNOTS + math.ceil(KNOTS_A_CAP * duration_s / CAP_S)
         self._path = Path(np.zeros((num_envs, most, 6)), np.zeros(num_envs, dtype=np.int64))
+        counts, workspace = make_counts(num_envs), make_workspace(self._scenes, len(self.parts))
+        level_of = np.zeros(num_envs, dtype=np.int64)
+        self._advance = Bound(
+            advance, self._scenes, level_of, self.state, counts, workspace, duration_s, CAP_S
+        )
+        self._cast_rays = Bound(cast_rays, self._scenes, level_of, self.state)
         self.reset(self._every)
 
     def reset(self, worlds: Int64) -> None:
@@ -141,18 +145,7 @@ class RigidPhysics:
         # Worlds of a part have room where the part begins, as all have together.
         room = slice(part * self._part_size, part * self._part_size + len(rows))
         path = Path(self._path.at[room], self._path.knots[room])
-        advance(
-            self._scenes,
-            self._level_of,
-            self.state,
-            rows,
-            self._duration_s,
-            CAP_S,
-            *path,
-            self._counts,
-            self._workspace,
-            part,
-        )
+        self._advance(rows, *path, part)
         return path
 
     def advance_late(self, worlds: Int64 | None, still: Int64) -> Path:
@@ -172,7 +165,5 @@ class RigidPhysics:
         """Return the distances, (n, rays) metres, to the first solid along each ray."""
         rows = self._every if worlds is None else worlds
         found = np.empty((len(rows), len(directions)))
-        cast_rays(
-            self._scenes, self._level_of, self.state, rows, offsets, directions, longest, found
-        )
+        self._cast_rays(rows, offsets, directions, longest, found)
         return found

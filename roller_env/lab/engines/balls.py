@@ -44,13 +44,13 @@ class Balls:
             self._scenes,
             self._levels,
             self.states.packed,
-            self._rows,
-            STEP_S,
-            self._cap_s,
-            self._path,
-            self._knots,
             self.counts,
             self._workspace,
+            STEP_S,
+            self._cap_s,
+            self._rows,
+            self._path,
+            self._knots,
             0,
         )
 

@@ -109,13 +109,13 @@ def advance(
     scenes: Scenes,
     level_of_row: Int64,
     states: Float64,
-    rows: Int64,
-    duration: float,
-    cap: float,
-    path: Float64,
-    knots: Int64,
     counts: Counts,
     workspace: Workspace,
+    duration: float,
+    cap: float,
+    rows: Int64,
+    path: Float64,
+    knots: Int64,
     thread: int,
 ) -> None:
     """Move the balls of some rows by a control step.
@@ -125,13 +125,13 @@ def advance(
         level_of_row: (N,) which level each ball is in.
         states: (N, width) where they are, and what is done to them, as `States.packed`; changed in
             place.
-        rows: (n,) which of them to move.
-        duration: of the control step, seconds.
-        cap: longest step of RK4, seconds.
-        path: (n, K, 6) receives the ways of the centres: see `roller_env.physics.rigid.path`.
-        knots: (n,) receives how many knots each has.
         counts: counted up.
         workspace: made for the scenes.
+        duration: of the control step, seconds.
+        cap: longest step of RK4, seconds.
+        rows: (n,) which of them to move.
+        path: (n, K, 6) receives the ways of the centres: see `roller_env.physics.rigid.path`.
+        knots: (n,) receives how many knots each has.
         thread: which of its memories to use; no other thread may use it meanwhile.
     """
     work = workspace.work[thread]

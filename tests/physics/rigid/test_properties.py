@@ -84,13 +84,13 @@ def test_until_it_meets_a_second_solid_a_ball_is_where_mujoco_has_it(name: str) 
             scenes,
             rows * 0,
             states.packed,
-            rows,
-            STEP_S,
-            1 / 120,
-            path,
-            knots,
             counts,
             workspace,
+            STEP_S,
+            1 / 120,
+            rows,
+            path,
+            knots,
             0,
         )
         places = stepper.qpos[:, ball : ball + 3]

@@ -33,8 +33,9 @@ def play(names: tuple[str, ...], of_row: np.ndarray, threads: int) -> tuple[Stat
     def part(thread: int) -> None:
         rows = parts[thread]
         ways = path[rows[0] : rows[-1] + 1], knots[rows[0] : rows[-1] + 1]
-        args = (scenes, of_row, states.packed, rows, STEP_S, CAP_S, *ways, counts)
-        advance(*args, workspace, thread)
+        advance(
+            scenes, of_row, states.packed, counts, workspace, STEP_S, CAP_S, rows, *ways, thread
+        )
 
     with ThreadPoolExecutor(threads) as pool:
         for step in range(60):

@@ -110,13 +110,13 @@ class World:
             self.scenes,
             self._level_of_row,
             self.states.packed,
-            self._rows,
-            STEP_S,
-            self.cap_s,
-            self.path,
-            self.knots,
             self.counts,
             self._workspace,
+            STEP_S,
+            self.cap_s,
+            self._rows,
+            self.path,
+            self.knots,
             0,
         )
 
