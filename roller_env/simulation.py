@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -108,6 +109,17 @@ class Snapshot:
             level_of_row=self.level_of_row[numbers],
             generators=tuple(self.generators[row] for row in numbers),
         )
+
+
+def joined(games: Sequence[Snapshot]) -> Snapshot:
+    """Return snapshots of one row each, or more, as one of many rows."""
+    return replace(
+        games[0],
+        physics=np.concatenate([game.physics for game in games]),
+        game=GameState.joined([game.game for game in games]),
+        level_of_row=np.concatenate([game.level_of_row for game in games]),
+        generators=tuple(generator for game in games for generator in game.generators),
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ Examples::
     roller level watch mine.yaml
     roller level check *.yaml
     roller level draw mine.yaml --view overview -o mine.png
+    roller level solve mine.yaml --robust
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from roller_env.level import (
     load_level,
     parse_level,
 )
+from roller_env.level.expand import expand
 from roller_env.level.reach import Play
 from roller_env.level.template import new_level
 from roller_env.physics.presets import physics_preset
@@ -232,6 +234,59 @@ def _export(output: Output = None) -> int:
     return schema(output or levels_directory() / "level.schema.json")
 
 
+def solve(
+    level: Annotated[str, tyro.conf.Positional],
+    output: Output = None,
+    all_coins: bool = False,
+    robust: bool = False,
+    budget: int = 5_000_000,
+    seed: int = 0,
+) -> int:
+    """Search for a play that ends at the finish, on the rigid engine, and write it as a replay.
+
+    It needs no route. The exit status is 1 if none was found in the budget, which does not say that
+    there is none.
+
+    Args:
+        level: name of a level, or a level file.
+        output: replay to write; by default the level's name and .replay, in this directory.
+        all_coins: search on until every coin is collected.
+        robust: search on until a play is found that is followed to the finish from 90 of 100 other
+            starts, on the rigid engine and on MuJoCo's default.
+        budget: environment steps to search for; a million take some seconds.
+        seed: of the search.
+    """
+    if budget < 1:
+        raise CommandError(f"--budget: found {budget}; must be 1 or more")
+    loaded = load_level(level)
+    # Imported here: the other commands play nothing.
+    from roller_env.replay.file import save_replay
+    from roller_env.solver import Search, prove
+
+    file = output or Path(f"{loaded.name}.replay")
+    if robust:
+        proof = prove(loaded, budget, all_coins, seed)
+        replay, steps = (None, budget) if proof is None else (proof.replay, proof.steps)
+    else:
+        proof, search = None, Search(loaded, seed)
+        solution = search.run(budget, all_coins)
+        replay = None if solution is None else search.replay(solution)
+        steps = search.steps
+    if replay is None:
+        print(f"not found in {steps:,} steps; there may be a way all the same", file=sys.stderr)
+        return 1
+    result, coins = replay.result, len(expand(loaded).coins)
+    print(f"finish after {result.time_s:.1f} s, coins {result.coins} of {coins}; {steps:,} steps")
+    for one in proof.robustness if proof else ():
+        print(
+            f"followed on {one.physics} from {one.games} starts: {one.finished:.0%} at the finish, "
+            f"{one.coins:.0%} of the coins"
+        )
+    save_replay(replay, file)
+    print(f"wrote {shown(file)}; 'roller replay {shown(file)}' shows it")
+    return 0
+
+
 def mjcf(
     level: Annotated[str, tyro.conf.Positional],
     output: Output = None,
@@ -328,6 +383,7 @@ COMMANDS: Final[dict[str, Callable[..., int]]] = {
     "draw": draw,
     "new": new,
     "watch": watch,
+    "solve": solve,
     "schema": schema,
     "mjcf": mjcf,
 }

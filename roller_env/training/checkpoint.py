@@ -38,12 +38,11 @@ from roller_env.game.actions import DIRECTIONS
 from roller_env.game.cameras import MODES
 from roller_env.pieces.coin import COIN
 from roller_env.problems import shown
-from roller_env.simulation import Snapshot
+from roller_env.simulation import Snapshot, joined
 from roller_env.training.config import TrainingConfig
 from roller_env.training.curriculum import (
     CurriculumSnapshot,
     StartStateCurriculum,
-    joined,
     separate,
 )
 from roller_env.training.exploration import Journeys

@@ -25,8 +25,7 @@ from roller_env.envs.infos import TERMS
 from roller_env.envs.sb3 import TRUNCATED, RollerVecEnv, VecSnapshot
 from roller_env.envs.spaces import shape_observation
 from roller_env.game.result import REWARD_TERMS
-from roller_env.game.state import GameState
-from roller_env.simulation import Snapshot
+from roller_env.simulation import Snapshot, joined
 from roller_env.training.exploration import Explorers, Journeys
 
 FROM_START: Final = "from_start"
@@ -394,17 +393,6 @@ class StartStateCurriculum(VecEnvWrapper):
         self._explorers.journeys = snapshot.journeys.copy()
         self._rng.bit_generator.state = snapshot.generator
         self._achieved = self.environments.simulation.state.achieved
-
-
-def joined(games: Sequence[Snapshot]) -> Snapshot:
-    """Return snapshots of one row each, or more, as one of many rows."""
-    return replace(
-        games[0],
-        physics=np.concatenate([game.physics for game in games]),
-        game=GameState.joined([game.game for game in games]),
-        level_of_row=np.concatenate([game.level_of_row for game in games]),
-        generators=tuple(generator for game in games for generator in game.generators),
-    )
 
 
 def separate(games: Snapshot) -> list[Snapshot]:

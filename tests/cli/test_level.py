@@ -15,6 +15,7 @@ from roller_env.cli.level import Preset, look, main, saves
 from roller_env.compile.compiled import level_mjcf
 from roller_env.level import level_json_schema, load_level
 from roller_env.physics.presets import PRESETS
+from roller_env.replay import load_replay
 from tests.level.samples import SMALL
 
 ROOT = Path(__file__).parents[2]
@@ -178,3 +179,24 @@ def test_a_file_that_is_not_there_yet_is_looked_at_once_and_again_when_it_is(her
 
 def test_the_presets_offered_are_those_there_are() -> None:
     assert get_args(Preset) == tuple(PRESETS)
+
+
+def test_solve_writes_a_play_that_ends_at_the_finish(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["solve", "gate", "--robust"]) == 0
+    said = capsys.readouterr().out
+    assert "finish after" in said
+    assert "of 8; " in said
+    assert "followed on default from 100 starts" in said
+    assert load_replay(here / "gate.replay").result.success
+
+
+def test_solve_says_that_nothing_was_found_and_not_that_there_is_nothing(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["solve", "classic", "--budget", "1000"]) == 1
+    assert "not found in 6,400 steps; there may be a way all the same" in capsys.readouterr().err
+    assert not (here / "classic.replay").exists()
+    assert main(["solve", "classic", "--budget", "0"]) == 1
+    assert "--budget: found 0; must be 1 or more" in capsys.readouterr().err
