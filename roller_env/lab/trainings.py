@@ -93,7 +93,7 @@ class Experiment:
 
 EXPERIMENTS: Final[Mapping[str, Experiment]] = {
     "seeds": Experiment(
-        tuple(Trial(RECIPE, level, seed) for seed in range(40, 50) for level in LEVELS)
+        tuple(Trial(RECIPE, level, seed) for seed in range(50, 60) for level in LEVELS)
     ),
     "factors": Experiment(
         tuple(

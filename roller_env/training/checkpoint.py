@@ -89,10 +89,15 @@ class Progress:
     Attributes:
         steps: environment steps, over all environments.
         wall_s: seconds spent training, over all sessions.
+        mastery: share of the coins taken in games that end at the finish, others counting nothing:
+            a running mean over episodes.
+        final_from: steps after which the training began to end; None before.
     """
 
     steps: int = 0
     wall_s: float = 0.0
+    mastery: float = 0.0
+    final_from: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +183,7 @@ def load_checkpoint(file: Path) -> Checkpoint:
         return Checkpoint(
             file=file,
             config=TrainingConfig.model_validate(facts["config"]),
-            progress=Progress(int(progress["steps"]), float(progress["wall_s"])),
+            progress=Progress(**progress),
             state=_nested({**facts["state"], **arrays}),
         )
     except (zipfile.BadZipFile, SafetensorError, ValidationError) as error:

@@ -158,7 +158,15 @@ class TrainingConfig(_Frozen):
         num_envs: environments that are stepped together.
         start_state_curriculum: fraction of the environments that do not play from the level's start
             but practise what is achieved least surely; see `roller_env.training.curriculum`.
-        total_steps: environment steps, over all environments, after which training ends.
+        total_steps: environment steps, over all environments, after which training ends at the
+            latest.
+        mastery: share of the coins in games that end at the finish, as a running mean over
+            episodes, from which on the level counts as mastered; training then ends after
+            ``final_steps``. None: it goes on to ``total_steps``.
+        final_steps: environment steps at the end over which the learning rate and the entropy
+            coefficient go to their last values. Before, the learning rate is constant, and the
+            entropy coefficient falls towards 0 as mastery comes. (Of language models: S. Hu et al.,
+            *MiniCPM*, 2024, "warmup-stable-decay".) Only with ``mastery``.
         wall_clock_budget_s: training ends after this time at the latest; None for no limit.
             A run that ends by time is not repeatable bit for bit on another machine.
         checkpoint_interval_s: a checkpoint is written when the last is this old.
@@ -184,6 +192,8 @@ class TrainingConfig(_Frozen):
     num_envs: Annotated[WholeNumber, Field(gt=0, le=MAX_ENVS)] = 256
     start_state_curriculum: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     total_steps: Annotated[WholeNumber, Field(gt=0, le=MAX_STEPS)] = 4_000_000
+    mastery: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
+    final_steps: Annotated[WholeNumber, Field(gt=0, le=MAX_STEPS)] = 400_000
     wall_clock_budget_s: PositiveFloat | None = None
     checkpoint_interval_s: NonNegativeFloat = 30.0
     normalise_observations: bool = True

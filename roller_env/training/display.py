@@ -30,9 +30,17 @@ class ProgressDisplay:
             else None
         )
 
-    def update(self, steps: int, achieved: str) -> None:
-        """Show that `steps` are done, and in a few words what the agent now reaches."""
+    def update(self, steps: int, total_steps: int, achieved: str) -> None:
+        """Show that `steps` are done, and in a few words what the agent now reaches.
+
+        Args:
+            steps: so far.
+            total_steps: of the training, as far as that is known now.
+            achieved: in a few words.
+        """
+        self._total = total_steps
         if self._bar is not None:
+            self._bar.total = total_steps
             self._bar.set_postfix_str(achieved, refresh=False)
             self._bar.update(steps - self._steps)
         elif time.monotonic() - self._line_s >= SECONDS_BETWEEN_LINES or steps >= self._total:

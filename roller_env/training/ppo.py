@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
@@ -25,6 +25,9 @@ from roller_env.training.display import ProgressDisplay
 from roller_env.training.files import RunFiles
 from roller_env.training.logs import STEPS, ContinuingCSV, ContinuingTensorBoard
 from roller_env.training.network import network_class, network_options
+
+_MEMORY: Final = 0.01
+"""Share that an episode has of the running mean of mastery."""
 
 _ROWS_PER_EXPLORER: Final = 4
 """Environments that are learnt from for each that only explores."""
@@ -79,7 +82,27 @@ def is_complete(config: TrainingConfig, progress: Progress) -> bool:
     """Return whether a training wants no more steps."""
     budget_s = config.wall_clock_budget_s
     out_of_time = budget_s is not None and progress.wall_s >= budget_s
-    return progress.steps >= config.total_steps or out_of_time
+    return progress.steps >= last_step(config, progress) or out_of_time
+
+
+def last_step(config: TrainingConfig, progress: Progress) -> int:
+    """Return after how many steps a training ends, as far as that is known."""
+    if progress.final_from is None:
+        return config.total_steps
+    return min(progress.final_from + config.final_steps, config.total_steps)
+
+
+def finality(config: TrainingConfig, progress: Progress) -> float:
+    """Return how far the last values of what changes are reached, 0 to 1.
+
+    Without a mastery to reach they are so evenly from the first step to the last.
+    """
+    if config.mastery is None:
+        return progress.steps / config.total_steps
+    begins = progress.final_from
+    if begins is None:
+        begins = config.total_steps - config.final_steps
+    return min(max((progress.steps - begins) / config.final_steps, 0.0), 1.0)
 
 
 def make_environments(config: TrainingConfig) -> StartStateCurriculum:
@@ -101,11 +124,10 @@ def new_model(config: TrainingConfig, environments: StartStateCurriculum) -> PPO
         gamma=config.ppo.gamma,
     )
     ppo = config.ppo
-    end = 0.0 if ppo.learning_rate_decay == "linear" else ppo.learning_rate
     return PPO(
         network_class(config),
         normaliser,
-        learning_rate=LinearSchedule(ppo.learning_rate, end, end_fraction=1.0),
+        learning_rate=_LearningRate(config),
         n_steps=ppo.rollout_steps,
         batch_size=ppo.batch_size,
         n_epochs=ppo.epochs,
@@ -120,6 +142,25 @@ def new_model(config: TrainingConfig, environments: StartStateCurriculum) -> PPO
         seed=config.seed,
         device="cpu",
     )
+
+
+class _LearningRate:
+    """The learning rate; SB3 knows how far a training is only of those that end at a known step.
+
+    Attributes:
+        progress: of the training, before the rollout that is learnt from.
+    """
+
+    def __init__(self, config: TrainingConfig) -> None:
+        self.progress = Progress()
+        self._config, ppo = config, config.ppo
+        end = 0.0 if ppo.learning_rate_decay == "linear" else ppo.learning_rate
+        self._linear = LinearSchedule(ppo.learning_rate, end, end_fraction=1.0)
+
+    def __call__(self, progress_remaining: float) -> float:
+        if self._config.mastery is None:
+            return self._linear(progress_remaining)
+        return self._linear(1.0 - finality(self._config, self.progress))
 
 
 class _BudgetSpent(Exception):
@@ -149,6 +190,13 @@ class _Episodes:
             },
         }
 
+    def mastery(self, before: float) -> float:
+        """Return the running mean of `Progress.mastery` after these episodes."""
+        for info in self.infos:
+            achieved = info["success"] * info["score_percent"] / 100.0
+            before += _MEMORY * (achieved - before)
+        return before
+
     @staticmethod
     def _mean(values: list[float]) -> float:
         return float(np.mean(values)) if values else float("nan")
@@ -177,13 +225,17 @@ class _Recorder(BaseCallback):
         self._between_updates()
         if is_complete(self._config, self.progress):
             raise _BudgetSpent
+        assert isinstance(self.model, PPO)
+        assert isinstance(self.model.learning_rate, _LearningRate)
+        self.model.learning_rate.progress = self.progress
         begin, end = (
             self._config.ppo.entropy_coefficient,
             self._config.ppo.final_entropy_coefficient,
         )
+        if self._config.mastery is not None:
+            begin *= 1.0 - self.progress.mastery
         if end is not None:
-            assert isinstance(self.model, PPO)
-            done = self.progress.steps / self._config.total_steps
+            done = finality(self._config, self.progress)
             self.model.ent_coef = begin + (end - begin) * done
 
     def _on_training_end(self) -> None:
@@ -195,7 +247,11 @@ class _Recorder(BaseCallback):
             return
         before = self.progress
         wall_s = self._wall_s_before + time.monotonic() - self._start_s
-        self.progress = replace(before, steps=steps, wall_s=wall_s)
+        mastery = self._episodes.mastery(before.mastery)
+        final_from = before.final_from
+        if final_from is None and self._config.mastery and mastery >= self._config.mastery:
+            final_from = steps
+        self.progress = Progress(steps, wall_s, mastery, final_from)
         speed = (steps - before.steps) / max(wall_s - before.wall_s, 1e-9)
         statistics = self._episodes.statistics()
         self._episodes = _Episodes()
@@ -205,7 +261,7 @@ class _Recorder(BaseCallback):
         self.logger.record("time/fps", round(speed))
         self.logger.record("time/wall_s", round(wall_s, 3), exclude="tensorboard")
         self.logger.dump(steps)
-        self.display.update(steps, _achieved(statistics))
+        self.display.update(steps, last_step(self._config, self.progress), _achieved(statistics))
         self._checkpoint_if_due()
 
     def _checkpoint_if_due(self) -> None:
