@@ -27,9 +27,8 @@ from roller_env.lab.table import Frame, markdown
 from roller_env.training import load_config
 from roller_env.training.files import RunFiles
 from roller_env.training.logs import STEPS, read_progress
-from roller_env.training.policy import load_policy, save_policy
-from roller_env.training.ppo import learn
-from roller_env.training.run import evaluate_policy
+from roller_env.training.policy import load_policy
+from roller_env.training.run import evaluate_policy, learn_to_mastery
 
 RECIPE: Final = "recipe"
 """The variant in which nothing is changed."""
@@ -182,9 +181,8 @@ def _tried(
     with tempfile.TemporaryDirectory() as directory:
         files = RunFiles(Path(directory))
         start_s, cpu_s = time.monotonic(), time.process_time()
-        model, progress = learn(config, files)
+        progress = learn_to_mastery(config, files)
         wall_s, cpu_s = time.monotonic() - start_s, time.process_time() - cpu_s
-        save_policy(model, config, files)
         policy = load_policy(files.directory)
         evaluation = evaluate_policy(policy, config, config.evaluation_episodes)
         curve = list(_thinned(read_progress(files.progress), evaluation.coins_in_level))

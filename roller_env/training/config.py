@@ -162,7 +162,8 @@ class TrainingConfig(_Frozen):
             latest.
         mastery: share of the coins in games that end at the finish, as a running mean over
             episodes, from which on the level counts as mastered; training then ends after
-            ``final_steps``. None: it goes on to ``total_steps``.
+            ``final_steps``, if the likeliest actions reach as much in the evaluation's environment,
+            and goes on otherwise. None: it goes on to ``total_steps``.
         final_steps: environment steps at the end over which the learning rate and the entropy
             coefficient go to their last values. Before, the learning rate is constant, and the
             entropy coefficient falls towards 0 as mastery comes. (Of language models: S. Hu et al.,
@@ -230,6 +231,16 @@ class TrainingConfig(_Frozen):
                     "envs": self.num_envs,
                     "steps": self.ppo.rollout_steps,
                 },
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _the_end_fits_into_the_training(self) -> TrainingConfig:
+        if self.mastery is not None and self.final_steps > self.total_steps:
+            raise PydanticCustomError(
+                "long_end",
+                "final_steps {final} are more than total_steps {total}",
+                {"final": self.final_steps, "total": self.total_steps},
             )
         return self
 

@@ -80,9 +80,14 @@ def learn(config: TrainingConfig, files: RunFiles) -> tuple[PPO, Progress]:
 
 def is_complete(config: TrainingConfig, progress: Progress) -> bool:
     """Return whether a training wants no more steps."""
+    return progress.steps >= last_step(config, progress) or has_spent_all(config, progress)
+
+
+def has_spent_all(config: TrainingConfig, progress: Progress) -> bool:
+    """Return whether a training may not go on, whatever it has reached."""
     budget_s = config.wall_clock_budget_s
     out_of_time = budget_s is not None and progress.wall_s >= budget_s
-    return progress.steps >= last_step(config, progress) or out_of_time
+    return progress.steps >= config.total_steps or out_of_time
 
 
 def last_step(config: TrainingConfig, progress: Progress) -> int:

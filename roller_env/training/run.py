@@ -7,11 +7,12 @@ import os
 import platform
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 from pydantic_core import from_json
 
 from roller_env import __version__
@@ -20,7 +21,12 @@ from roller_env.envs.vector import RollerVectorEnv
 from roller_env.problems import printable, shown
 from roller_env.replay.contents import MAX_TEXT
 from roller_env.training.behaviour_cloning import start_from_demonstrations
-from roller_env.training.checkpoint import CheckpointError, Progress, load_checkpoint
+from roller_env.training.checkpoint import (
+    CheckpointError,
+    Progress,
+    load_checkpoint,
+    save_checkpoint,
+)
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.demonstrations import Demonstration, load_demonstrations
 from roller_env.training.evaluate import Evaluation, check_recordable, envs_and_repeats, evaluate
@@ -33,7 +39,7 @@ from roller_env.training.files import (
 )
 from roller_env.training.pictures import draw_paths, film_episode
 from roller_env.training.policy import Policy, load_policy, save_policy
-from roller_env.training.ppo import learn
+from roller_env.training.ppo import has_spent_all, learn
 from roller_env.training.report import (
     advice,
     draw_learning_curve,
@@ -43,6 +49,11 @@ from roller_env.training.report import (
 
 EVALUATION_SEED_OFFSET: Final = 1_000_000
 """Added to a training's seed, so that an agent is judged on starts it was not trained on."""
+
+VALIDATION_SEED_OFFSET: Final = 2_000_000
+"""The same of the games that decide whether a training goes on: the evaluation has others."""
+
+VALIDATION_EPISODES: Final = 64
 
 MAX_SUMMARY_BYTES: Final = 2**24
 
@@ -124,8 +135,7 @@ def _train(
         return TrainingRun(files, _read_summary(files.summary), was_finished=True)
     if demonstrations is not None:
         print(start_from_demonstrations(config, demonstrations, files), flush=True)
-    model, progress = learn(config, files)
-    save_policy(model, config, files)
+    progress = learn_to_mastery(config, files)
     start_s = time.monotonic()
     policy = load_policy(files.directory)
     player = player_of(files.directory)
@@ -140,6 +150,32 @@ def _train(
     summary = _summary(config, progress, time.monotonic() - start_s)
     write_atomically(files.summary, json.dumps(summary, indent=2) + "\n")
     return TrainingRun(files, summary, was_finished=False)
+
+
+def learn_to_mastery(config: TrainingConfig, files: RunFiles) -> Progress:
+    """Train until the level is mastered by the likeliest actions, too, and keep the policy.
+
+    While it learns the agent draws its actions, and may finish all of its games by chance where the
+    likeliest action leads nowhere. So what has been mastered is judged once more, in games of the
+    evaluation's environment that the evaluation does not play; an agent that falls short goes on.
+
+    Args:
+        config: of the training. Without ``mastery`` it just ends after its steps.
+        files: where checkpoint and logs are or go.
+    """
+    while True:
+        model, progress = learn(config, files)
+        save_policy(model, config, files)
+        if config.mastery is None or has_spent_all(config, progress):
+            return progress
+        seed = config.seed + VALIDATION_SEED_OFFSET
+        played = evaluate_policy(load_policy(files.directory), config, VALIDATION_EPISODES, seed)
+        mastery = float(np.mean([r.success * r.score_percent / 100.0 for r in played.results]))
+        if mastery >= config.mastery:
+            return progress
+        print(f"by its likeliest actions {mastery:.0%} are mastered: it goes on", flush=True)
+        again = replace(progress, mastery=0.0, final_from=None)
+        save_checkpoint(files.checkpoint, model, config, again)
 
 
 def evaluate_policy(
