@@ -104,10 +104,10 @@ def finality(config: TrainingConfig, progress: Progress) -> float:
     """
     if config.mastery is None:
         return progress.steps / config.total_steps
-    begins = progress.final_from
+    begins, length = progress.final_from, min(config.final_steps, config.total_steps)
     if begins is None:
-        begins = config.total_steps - config.final_steps
-    return min(max((progress.steps - begins) / config.final_steps, 0.0), 1.0)
+        begins = config.total_steps - length
+    return min(max((progress.steps - begins) / length, 0.0), 1.0)
 
 
 def make_environments(config: TrainingConfig) -> StartStateCurriculum:

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -18,13 +19,15 @@ import torch
 
 from roller_env.drawing.opengl import missing_opengl
 from roller_env.level import LevelError, load_level
+from roller_env.training import ppo, run
+from roller_env.training.checkpoint import Progress
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.demonstrations import DemonstrationError
 from roller_env.training.files import RunError, RunFiles, run_directory
 from roller_env.training.logs import STEPS, read_progress
 from roller_env.training.policy import TrainedPolicy, load_policy
-from roller_env.training.ppo import learn, make_environments, new_model
-from roller_env.training.run import evaluate_policy, train
+from roller_env.training.ppo import finality, last_step, learn, make_environments, new_model
+from roller_env.training.run import evaluate_policy, learn_to_mastery, train
 from tests.patience import STALLED_S
 from tests.training.disk import largest_file
 from tests.training.small import UPDATES, small_config
@@ -324,6 +327,62 @@ def test_every_kind_of_observation_and_action_can_be_trained(
     _, progress = learn(config, RunFiles(tmp_path))
     assert progress.steps == 256
     assert UPDATES > 2
+
+
+UPDATE = 8 * 16
+"""Steps between two updates of a small training."""
+
+
+@pytest.mark.parametrize(
+    ("judged", "steps"), [((1.0,), 4 * UPDATE), ((0.2, 1.0), 8 * UPDATE), ((0.2,) * 9, 9 * UPDATE)]
+)
+def test_a_training_ends_when_the_likeliest_actions_have_mastered_the_level(
+    judged: tuple[float, ...],
+    steps: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    config = small_config(total_steps=9 * UPDATE, mastery=0.5, final_steps=2 * UPDATE)
+    found = iter(judged)
+
+    def played(*_: object) -> SimpleNamespace:
+        result = SimpleNamespace(success=True, score_percent=100.0 * next(found))
+        return SimpleNamespace(results=[result])
+
+    # As if whoever learns did well from the second update on.
+    monkeypatch.setattr(ppo._Episodes, "mastery", lambda _, before: before + 0.25)
+    monkeypatch.setattr(run, "evaluate_policy", played)
+    progress = learn_to_mastery(config, RunFiles(tmp_path))
+    assert progress.steps == steps
+    goes_on = capsys.readouterr().out.count("by its likeliest actions 20% are mastered: it goes on")
+    assert goes_on == sum(share < 0.5 for share in judged[: len(judged) - len(list(found))])
+
+
+def test_rates_stay_until_the_end_and_go_to_their_last_values_there() -> None:
+    config = small_config(total_steps=1000, mastery=0.9, final_steps=200)
+    assert [finality(config, Progress(steps)) for steps in (0, 800, 900, 1000)] == [0, 0, 0.5, 1]
+    early = Progress(500, final_from=450)
+    assert finality(config, early) == 0.25
+    assert last_step(config, early) == 650
+    # An end that is longer than the training is all of it.
+    short = small_config(total_steps=100, mastery=0.9, final_steps=200)
+    assert finality(short, Progress(25)) == 0.25
+    plain = small_config(total_steps=1000)
+    assert finality(plain, Progress(250)) == 0.25
+
+
+def test_a_training_to_mastery_goes_on_with_the_same_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ppo._Episodes, "mastery", lambda _, before: before + 0.25)
+    changes = {"mastery": 0.5, "final_steps": 3 * UPDATE}
+    whole, _ = learn(small_config(**changes), RunFiles(tmp_path / "whole"))
+    files = RunFiles(tmp_path / "parts")
+    for budget_s in (1e-9, 1e-9, 1e-9, None):
+        model, _ = learn(small_config(wall_clock_budget_s=budget_s, **changes), files)
+    for name, value in whole.policy.state_dict().items():
+        assert torch.equal(model.policy.state_dict()[name], value), name
 
 
 def test_a_run_without_a_policy_says_how_to_get_one(tmp_path: Path) -> None:
