@@ -9,6 +9,7 @@ Examples::
     roller level check *.yaml
     roller level draw mine.yaml --view overview -o mine.png
     roller level solve mine.yaml --robust
+    roller level generate --seed 7 --difficulty 0.6
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from roller_env.level import (
 from roller_env.level.expand import expand
 from roller_env.level.reach import Play
 from roller_env.level.template import new_level
+from roller_env.level.text import level_text
 from roller_env.physics.presets import physics_preset
 from roller_env.problems import Problem, printable, shown
 
@@ -287,6 +289,37 @@ def solve(
     return 0
 
 
+def generate(
+    seed: int = 0, difficulty: float = 0.5, output: Output = None, view: View = "overview"
+) -> int:
+    """Write a level that the generator makes and the solver has won, and a picture of it.
+
+    Args:
+        seed: which level; the same seed and difficulty give the same one for ever.
+        difficulty: 0 to 1.
+        output: level file to write; by default the level's name and .yaml, in this directory.
+        view: of the picture, which lies beside it: plan needs no OpenGL, overview does.
+    """
+    # Imported here: the other commands play nothing.
+    from roller_env.solver import won_level
+
+    try:
+        won = won_level(seed, difficulty)
+    except (RuntimeError, ValueError) as error:
+        raise CommandError(str(error)) from None
+    file = output or Path(f"{won.level.name}.yaml")
+    if file.suffix not in (".yaml", ".yml"):
+        raise CommandError(f"{file}: the name of a level file must end in .yaml")
+    _write(level_text(won.level), file)
+    _draw(won.level, file.with_suffix(".png"), view)
+    time_s, coins = won.replay.result.time_s, len(expand(won.level).coins)
+    print(
+        f"won in {time_s:.1f} s, {won.replay.result.coins} of {coins} coins; "
+        f"attempt {won.attempts}, {won.steps:,} steps of search"
+    )
+    return 0
+
+
 def mjcf(
     level: Annotated[str, tyro.conf.Positional],
     output: Output = None,
@@ -384,6 +417,7 @@ COMMANDS: Final[dict[str, Callable[..., int]]] = {
     "new": new,
     "watch": watch,
     "solve": solve,
+    "generate": generate,
     "schema": schema,
     "mjcf": mjcf,
 }

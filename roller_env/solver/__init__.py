@@ -8,7 +8,17 @@ Found plays are replays, which anyone can verify. What was not found in the budg
 the same.
 """
 
-from roller_env.solver.search import Search, Solution, solve
+from roller_env.solver.search import Search, Solution, Won, solve, won_level
 from roller_env.solver.tracker import Proof, Robustness, prove, robustness
 
-__all__ = ["Proof", "Robustness", "Search", "Solution", "prove", "robustness", "solve"]
+__all__ = [
+    "Proof",
+    "Robustness",
+    "Search",
+    "Solution",
+    "Won",
+    "prove",
+    "robustness",
+    "solve",
+    "won_level",
+]

@@ -13,6 +13,7 @@ from roller_env.arrays import Float64, Int64
 from roller_env.config import EnvConfig, make_config
 from roller_env.game.actions import DIRECTIONS, forces
 from roller_env.level import Level
+from roller_env.level.generate import generate
 from roller_env.pieces.coin import COIN
 from roller_env.pieces.finish import FINISH
 from roller_env.replay.contents import Replay
@@ -230,3 +231,49 @@ def solve(
     search = Search(level, seed)
     solution = search.run(budget, all_coins)
     return None if solution is None else search.replay(solution)
+
+
+@dataclass(frozen=True, slots=True)
+class Won:
+    """A generated level that the solver has won.
+
+    Attributes:
+        level: the level.
+        replay: the play that won it.
+        attempts: how many levels of the seed were given up before, and this one.
+        steps: environment steps of all searches.
+    """
+
+    level: Level
+    replay: Replay
+    attempts: int
+    steps: int
+
+
+GENERATED_BUDGET: Final = 600_000
+"""Environment steps that a generated level may take; who is not won in them is rejected."""
+
+_MOST_ATTEMPTS: Final = 20
+
+
+def won_level(seed: int, difficulty: float = 0.5) -> Won:
+    """Return the first generated level of a seed and difficulty that the solver wins.
+
+    Args:
+        seed: see `roller_env.level.generate.generate`.
+        difficulty: likewise.
+
+    Raises:
+        RuntimeError: none of twenty was won.
+    """
+    steps = 0
+    for attempt in range(_MOST_ATTEMPTS):
+        level = generate(seed, difficulty, attempt)
+        search = Search(level)
+        solution = search.run(GENERATED_BUDGET)
+        steps += search.steps
+        if solution is not None:
+            return Won(level, search.replay(solution), attempt + 1, steps)
+    raise RuntimeError(
+        f"seed {seed}, difficulty {difficulty:g}: none of {_MOST_ATTEMPTS} levels was won"
+    )

@@ -200,3 +200,16 @@ def test_solve_says_that_nothing_was_found_and_not_that_there_is_nothing(
     assert not (here / "classic.replay").exists()
     assert main(["solve", "classic", "--budget", "0"]) == 1
     assert "--budget: found 0; must be 1 or more" in capsys.readouterr().err
+
+
+def test_generate_writes_a_level_that_was_won_and_a_picture_of_it(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["generate", "--seed", "2", "--difficulty", "0.2", "--view", "plan"]) == 0
+    said = capsys.readouterr().out
+    assert "won in" in said
+    (file,) = here.glob("generated-*.yaml")
+    assert file.with_suffix(".png").stat().st_size > 0
+    assert main(["check", file.name, "--strict"]) == 0
+    assert main(["generate", "--difficulty", "2"]) == 1
+    assert "difficulty: found 2.0; must be a number from 0 to 1" in capsys.readouterr().err
