@@ -14,7 +14,7 @@ import numpy.typing as npt
 from roller_env import checks
 from roller_env.arrays import Bool, Float32, Float64, Int64
 from roller_env.compiled import Bound
-from roller_env.config import MAX_ENVS, EnvConfig
+from roller_env.config import MAX_ENVS, EnvConfig, LevelSource
 from roller_env.divergence import report
 from roller_env.game import observations, step
 from roller_env.game.result import REWARD_TERMS, EpisodeResult
@@ -36,27 +36,45 @@ from roller_env.workers import Workers
 
 
 def make_physics(
-    level: Level, preset: PhysicsPreset, num_envs: int, substeps: int, num_threads: int
+    levels: Sequence[Level],
+    table: LevelTable,
+    level_of: Int64,
+    preset: PhysicsPreset,
+    substeps: int,
+    num_threads: int,
 ) -> Physics:
-    """Return the engine that a preset names, with worlds of a level.
+    """Return the engine that a preset names, with worlds of some levels.
 
     Args:
-        level: that `roller_env.level.load_level` has accepted.
+        levels: that `roller_env.level.load_level` has accepted; one, if the engine is MuJoCo.
+        table: of these.
+        level_of: (N,) which of them each world is; the engine reads it when a world is reset.
         preset: the settings.
-        num_envs: number of worlds.
         substeps: physics steps in a control step.
         num_threads: native threads; 0 means one for each CPU.
+
+    Raises:
+        ValueError: the engine is MuJoCo and there are several levels.
     """
+    num_envs = len(level_of)
     # Here, since one engine does not need what the other is made of.
     if preset.engine == "rigid":
         from roller_env.compile.rigid import RigidPhysics
 
         duration_s = substeps * preset.dt_s
-        return RigidPhysics(level, num_envs, substeps, num_threads, duration_s, preset.law)
+        slots, slabs = table.slots(levels), table.movers.stop.shape[1]
+        return RigidPhysics(
+            levels, level_of, slots, slabs, num_envs, substeps, num_threads, duration_s, preset.law
+        )
+    if len(levels) > 1:
+        raise ValueError(
+            f"levels: found {len(levels)} with physics {preset.name!r}; several can be played only "
+            "with 'rigid' and 'relaxed'"
+        )
     from roller_env.compile.compiled import compile_level
     from roller_env.compile.physics import MujocoPhysics
 
-    return MujocoPhysics(compile_level(level, preset), num_envs, substeps, num_threads)
+    return MujocoPhysics(compile_level(levels[0], preset), num_envs, substeps, num_threads)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +85,7 @@ class Snapshot:
     level, physics preset or control step refuses it.
 
     Attributes:
-        level: what is played.
+        levels: what is played.
         physics: (n, width) float64, the engine's state.
         columns: where everything is in it.
         game: the rules', the cameras' and the shaping's.
@@ -77,7 +95,7 @@ class Snapshot:
         control_dt_s: length of a control step, seconds.
     """
 
-    level: Level
+    levels: tuple[Level, ...]
     physics: Float64
     columns: Columns
     game: GameState
@@ -164,7 +182,7 @@ class Transition:
 
 
 class Simulation:
-    """N independent games of one level, stepped together.
+    """N independent games, stepped together: all of one level, or each of any of several.
 
     A step, in the order of the transition contract (docs/rules.md): physics; events along the path;
     reward and termination for the task as it was when the step began; consequences. `observe` then
@@ -172,7 +190,7 @@ class Simulation:
 
     Attributes:
         config: the options.
-        level: what is played.
+        levels: what is played. Of several every reset draws one for each row, alike often.
         preset: the settings of the physics.
         state: the game's state; read it, and change it only through `restore`.
         table: the level data of every row.
@@ -180,16 +198,27 @@ class Simulation:
         divergences: how many games the physics has ended so far.
     """
 
-    def __init__(self, config: EnvConfig, num_envs: int = 1):
+    def __init__(
+        self, config: EnvConfig, num_envs: int = 1, levels: Sequence[LevelSource] | None = None
+    ):
         """Compile the level and make ``num_envs`` games of it; call `reset` before `step`.
 
+        Args:
+            config: the options.
+            num_envs: how many games.
+            levels: to be played instead of the one of the options.
+
         Raises:
-            LevelError: the level is not valid.
-            ValueError: ``num_envs`` is not a whole number from 1 to `MAX_ENVS`.
+            LevelError: a level is not valid.
+            ValueError: ``num_envs`` is not a whole number from 1 to `MAX_ENVS`, there are no
+                levels, or several on MuJoCo.
         """
         self.config = config
         self.num_envs = checks.whole("num_envs", num_envs, 1, MAX_ENVS)
-        self.level: Level = load_level(config.level)
+        given = [config.level] if levels is None else list(levels)
+        if not given:
+            raise ValueError("levels: found none; at least one is needed")
+        self.levels = tuple(load_level(level) for level in given)
         self.divergences = 0
         self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
         self._make_games()
@@ -199,12 +228,12 @@ class Simulation:
         config, num_envs = self.config, self.num_envs
         self.preset = config.preset
         self._duration_s = config.substeps * self.preset.dt_s
-        self.table = LevelTable.of_levels([self.level])
+        self.table = LevelTable.of_levels(self.levels)
         level_of = np.zeros(num_envs, dtype=np.int64)
         self._games = Games(self.table, level_of, self._episode_lengths(level_of))
         self.state = self._games.state
         self._physics = make_physics(
-            self.level, self.preset, num_envs, config.substeps, config.num_threads
+            self.levels, self.table, level_of, self.preset, config.substeps, config.num_threads
         )
         self._at = self._physics.columns
         self._bodies = Bodies.of(self._physics.state, self._at)
@@ -231,7 +260,7 @@ class Simulation:
         return {
             "config": self.config,
             "num_envs": self.num_envs,
-            "level": self.level,
+            "levels": self.levels,
             "divergences": self.divergences,
             "_generators": self._generators,
             "snapshot": self.snapshot(),
@@ -245,6 +274,24 @@ class Simulation:
         self.restore(snapshot)
 
     # What can be read ------------------------------------------------------------------------
+
+    @property
+    def level(self) -> Level:
+        """What is played.
+
+        Raises:
+            ValueError: that are several levels.
+        """
+        if len(self.levels) > 1:
+            raise ValueError(
+                f"found {len(self.levels)} levels in one simulation; this can be done with one"
+            )
+        return self.levels[0]
+
+    @property
+    def level_of(self) -> Int64:
+        """(N,) copy of which of `levels` each row plays."""
+        return self._games.level_of.copy()
 
     @property
     def duration_s(self) -> float:
@@ -379,9 +426,12 @@ class Simulation:
         # In order, as the physics asks for them; every row has its own generator.
         order = np.argsort(rows)
         rows = rows[order]
+        jitter = np.array([self._generators[row].uniform(-1.0, 1.0, 2) for row in rows])
+        if len(self.levels) > 1:
+            drawn = [self._generators[row].integers(len(self.levels)) for row in rows]
+            self._play(rows, np.array(drawn))
         level = self._games.level_of[rows]
         self._physics.reset(rows)
-        jitter = np.array([self._generators[row].uniform(-1.0, 1.0, 2) for row in rows])
         start = self.table.start[level]
         start[:, :2] += jitter * self.table.jitter[level]
         self._bodies.position[rows] = start
@@ -420,6 +470,8 @@ class Simulation:
                 )
         if position is not None:
             self._check_positions(position)
+        if coin_left is not None and len(self.levels) > 1:
+            raise ValueError("coins: can be chosen only where all games are of one level")
         return Placement(position, velocity, angular_velocity, coin_left)
 
     def _check_positions(self, position: Float64) -> None:
@@ -533,9 +585,10 @@ class Simulation:
             before: (n, width) the state of the physics before the step.
         """
         self.divergences += len(rows)
-        kept = report(self.level, self.preset, before[diverged])
+        level = self.levels[self._games.level_of[rows[0]]]
+        kept = report(level, self.preset, before[diverged])
         warnings.warn(
-            f"{len(rows)} game(s) of level {self.level.name!r} diverged and were ended; {kept}",
+            f"{len(rows)} game(s) of level {level.name!r} diverged and were ended; {kept}",
             RuntimeWarning,
             stacklevel=4,
         )
@@ -583,6 +636,11 @@ class Simulation:
         radius = self.table.ball_radius[self._games.level_of[envs]]
         return observations.ray_observation(level_rays, scan, radius)
 
+    def _play(self, rows: Int64, levels: Int64) -> None:
+        """Have rows, (n,), play levels from their next reset on, (n,) numbers in `levels`."""
+        self._games.level_of[rows] = levels
+        self._games.concluding.max_steps[rows] = self._episode_lengths(levels)
+
     def _episode_lengths(self, level_of: Int64) -> Int64:
         """Return the control steps, (N,), after which an episode is truncated."""
         limit_s = self.table.time_limit_s[level_of]
@@ -596,7 +654,7 @@ class Simulation:
         """Return all that the future of ``rows`` (all, if None) depends on, as copies."""
         rows = np.arange(self.num_envs) if rows is None else self._checked(rows)
         return Snapshot(
-            level=self.level,
+            levels=self.levels,
             physics=self._physics.state[rows].copy(),
             columns=self._at,
             game=self.state.copy_rows(rows),
@@ -619,10 +677,10 @@ class Simulation:
         rows = self._checked(np.arange(count) if rows is None else rows)
         if len(rows) != count:
             raise ValueError(f"rows: found {len(rows)} for a snapshot of {count}")
+        self._play(rows, snapshot.level_of_row)
         self._physics.reset(np.sort(rows))
         self._physics.state[rows] = snapshot.physics
         self.state.set_rows(rows, snapshot.game)
-        self._games.level_of[rows] = snapshot.level_of_row
         for row, generator in zip(rows, snapshot.generators, strict=True):
             self._generators[row].bit_generator.state = generator
         # The way is only kept where it is rewarded; elsewhere it is found again, from the first
@@ -638,12 +696,12 @@ class Simulation:
         """
         if not isinstance(snapshot, Snapshot):
             raise TypeError(f"snapshot: found {type(snapshot)}; must be a {Snapshot.__name__}")
-        theirs, ours = snapshot.level, self.level
+        theirs, ours = snapshot.levels, self.levels
         if theirs is not ours and theirs != ours:
-            other = "another" if theirs.name == ours.name else "one"
+            names, own = (", ".join(repr(level.name) for level in each) for each in (theirs, ours))
+            other = "another" if names == own else "one"
             raise ValueError(
-                f"snapshot: found {other} of level {theirs.name!r}; this simulation plays "
-                f"{ours.name!r}"
+                f"snapshot: found {other} of level {names}; this simulation plays {own}"
             )
         if snapshot.preset != self.preset:
             raise ValueError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -45,9 +46,21 @@ WORLDS_A_THREAD = 512
 """Fewer are not worth a thread of their own: they would wait for each other in Python."""
 
 
-def rigid_level(level: Level, law: ContactLaw = COULOMB) -> RigidLevel:
-    """Return a level as the engine takes it; its slabs are the movers of the expanded level."""
+def rigid_level(
+    level: Level, law: ContactLaw = COULOMB, slots: Sequence[int] | None = None, slabs: int = 0
+) -> RigidLevel:
+    """Return a level as the engine takes it; its slabs are the movers of the expanded level.
+
+    Args:
+        level: the level.
+        law: of its contacts.
+        slots: (movers,) which slab each mover is; by default they are numbered as they come.
+        slabs: how many slabs there are, if ``slots`` are given; those of no mover stand still.
+    """
     expanded = expand(level)
+    numbers = range(len(expanded.movers)) if slots is None else slots
+    stops = np.zeros(max(slabs, len(expanded.movers)))
+    stops[list(numbers)] = [mover.travel for mover in expanded.movers]
 
     def box(solid: Solid, slab: int = STATIC) -> SolidBox:
         material = level.material(solid.material)
@@ -64,22 +77,28 @@ def rigid_level(level: Level, law: ContactLaw = COULOMB) -> RigidLevel:
         solids=[
             *map(box, merge_solids(expanded.ground)),
             *map(box, expanded.machines),
-            *(box(mover.solid, number) for number, mover in enumerate(expanded.movers)),
+            *(
+                box(mover.solid, number)
+                for number, mover in zip(numbers, expanded.movers, strict=True)
+            ),
         ],
         radius=level.ball.radius,
         gravity=level.gravity,
         mass=level.ball.mass_kg,
-        slab_stop=[mover.travel for mover in expanded.movers],
+        slab_stop=stops.tolist(),
         law=law,
     )
 
 
 class RigidPhysics:
-    """N worlds of a level; see `roller_env.physics.protocol.Physics`."""
+    """N worlds of some levels; see `roller_env.physics.protocol.Physics`."""
 
     def __init__(
         self,
-        level: Level,
+        levels: Sequence[Level],
+        level_of: Int64,
+        slots: Sequence[Sequence[int]],
+        slabs: int,
         num_envs: int,
         substeps: int,
         num_threads: int,
@@ -89,7 +108,10 @@ class RigidPhysics:
         """Make the worlds.
 
         Args:
-            level: that `roller_env.level.load_level` has accepted.
+            levels: that `roller_env.level.load_level` has accepted.
+            level_of: (N,) which of them each world is; whoever changes it resets the world.
+            slots: of each level which slab each of its movers is.
+            slabs: how many slabs there are.
             num_envs: number of worlds, N.
             substeps: parts of a control step between which the path is kept, S.
             num_threads: threads; 0 means one for each CPU.
@@ -97,8 +119,14 @@ class RigidPhysics:
             law: of friction and impact.
         """
         self.substeps = substeps
-        self._start, self._duration_s = level.start.at, duration_s
-        self._scenes = pack([rigid_level(level, LAWS[law])])
+        self._start, self._duration_s = np.array([each.start.at for each in levels]), duration_s
+        self._level_of = level_of
+        self._scenes = pack(
+            [
+                rigid_level(level, LAWS[law], own, slabs)
+                for level, own in zip(levels, slots, strict=True)
+            ]
+        )
         movers = self._scenes.slab_stop.shape[1]
         self.columns = Columns(
             position=POSITION,
@@ -125,7 +153,6 @@ class RigidPhysics:
         most = KNOTS + math.ceil(KNOTS_A_CAP * duration_s / CAP_S)
         self._path = Path(np.zeros((num_envs, most, 6)), np.zeros(num_envs, dtype=np.int64))
         counts, workspace = make_counts(num_envs), make_workspace(self._scenes, len(self.parts))
-        level_of = np.zeros(num_envs, dtype=np.int64)
         self._advance = Bound(
             advance, self._scenes, level_of, self.state, counts, workspace, duration_s, CAP_S
         )
@@ -135,7 +162,7 @@ class RigidPhysics:
     def reset(self, worlds: Int64) -> None:
         """Put worlds back to where the level begins, at rest."""
         self.state[worlds] = 0.0
-        self._worlds.position[worlds] = self._start
+        self._worlds.position[worlds] = self._start[self._level_of[worlds]]
         self._worlds.orientation[worlds, 0] = 1.0
 
     def advance(self, worlds: Int64 | None) -> Path:

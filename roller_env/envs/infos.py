@@ -17,6 +17,9 @@ from roller_env.simulation import Simulation
 
 _KEYS: Final = ("success", "is_success", "score_percent", "coins", "time_s", "fall", "diverged")
 
+LEVEL: Final = "level"
+"""Key of the number of the level that a row plays, where there are several."""
+
 TERMS: Final = "reward_terms"
 """Key of the episode's reward by term, a dict with the keys `REWARD_TERMS`."""
 
@@ -51,6 +54,10 @@ def vector_info(simulation: Simulation, rows: Int64 | None = None) -> dict[str, 
         values = results[name]
         info[name] = _among(simulation.num_envs, rows, values)
         info[f"_{name}"] = _among(simulation.num_envs, rows, np.ones(len(values), dtype=bool))
+    if len(simulation.levels) > 1:
+        level_of = simulation.level_of if rows is None else simulation.level_of[rows]
+        info[LEVEL] = _among(simulation.num_envs, rows, level_of)
+        info[f"_{LEVEL}"] = info[f"_{_KEYS[0]}"].copy()
     over = simulation.state.over if rows is None else simulation.state.over[rows]
     if over.any():
         ended = _among(simulation.num_envs, rows, over)

@@ -15,7 +15,7 @@ from gymnasium.vector.utils import batch_space
 
 from roller_env.arrays import Bool, Float64, Int64, UInt8
 from roller_env.checks import nearest
-from roller_env.config import EnvConfig, make_config
+from roller_env.config import EnvConfig, LevelSource, make_config
 from roller_env.envs import spaces
 from roller_env.envs.arguments import reset_of, seeds_of
 from roller_env.envs.infos import vector_info
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
-    """N games of one level; row i does what a `RollerEnv` with row i's seed does, bit for bit.
+    """N games; of one level row i does what a `RollerEnv` with row i's seed does, bit for bit.
 
     Autoreset as Gymnasium defines it. NEXT_STEP: the step after an episode's last ignores its
     action and returns the reset observation with reward 0. SAME_STEP: the last step returns the
@@ -47,19 +47,27 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         num_envs: int = 1,
         *,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        levels: Sequence[LevelSource] | None = None,
         **options: Any,
     ):
         """Make ``num_envs`` games; see `roller_env.config.EnvConfig` for the options.
 
+        Args:
+            num_envs: how many.
+            autoreset_mode: when games that are over begin again.
+            levels: instead of the option ``level``: every reset draws one of them for each row, and
+                ``info["level"]`` says which; only with ``physics="rigid"`` or ``"relaxed"``.
+            options: of the environment.
+
         Raises:
             TypeError: there is no option of that name.
             ValueError: an option's value is not allowed.
-            LevelError: the level is not valid.
+            LevelError: a level is not valid.
         """
         self.config: EnvConfig = make_config(**options)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self._spec: EnvSpec | None = None
-        self.simulation = Simulation(self.config, num_envs)
+        self.simulation = Simulation(self.config, num_envs, levels)
         self.num_envs = self.simulation.num_envs
         self.single_action_space = spaces.action_space(self.config)
         self.single_observation_space = spaces.observation_space(self.config)
@@ -80,6 +88,11 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
         plain = {**self.config.to_json(), "autoreset_mode": self.autoreset_mode.name}
+        if len(self.simulation.levels) > 1:
+            plain["levels"] = [
+                level.model_dump(mode="json", exclude_defaults=True)
+                for level in self.simulation.levels
+            ]
         self._spec = plain_spec(spec, plain)
 
     @property  # type: ignore[misc]

@@ -125,6 +125,19 @@ class LevelTable(NamedTuple):
             owns=_owns(_widths(regions), _widths(movers)),
         )
 
+    def slots(self, levels: Sequence[Level]) -> list[list[int]]:
+        """Return of each of the table's levels which mover of the table each of its movers is."""
+        kinds = [kind for kind in PIECE_KINDS if kind.rules is not None]
+        slots = []
+        for expanded in map(expand, levels):
+            used = dict.fromkeys(kinds, 0)
+            own = []
+            for kind in expanded.mover_kinds:
+                own.append(int(self.owns[kinds.index(kind)][2]) + used[kind])
+                used[kind] += 1
+            slots.append(own)
+        return slots
+
     def of(self, rules: Rules[TableT, Any]) -> TableT:
         """Return a kind's own table."""
         table: TableT = self.kinds[RULES.index(rules)]

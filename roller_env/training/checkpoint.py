@@ -288,7 +288,7 @@ def _of_curriculum(snapshot: CurriculumSnapshot) -> Tree:
     kept_for = [task for task, games in snapshot.games.items() for _ in games]
     games = [game for games in snapshot.games.values() for game in games]
     return {
-        "level": snapshot.environments.games.level.model_dump_json(),
+        "level": snapshot.environments.games.levels[0].model_dump_json(),
         "games": _of_snapshot(snapshot.environments.games),
         "returns": snapshot.environments.returns,
         "lengths": snapshot.environments.lengths,
@@ -308,8 +308,10 @@ def _curriculum(tree: Tree, own: CurriculumSnapshot) -> CurriculumSnapshot:
         ValueError: it is of another level, or numbers point at what is not there.
     """
     games, rows, ticks = own.environments.games, len(own.age), int(tree["ticks"])
-    if tree["level"] != games.level.model_dump_json():
-        raise ValueError(f"the level {games.level.name!r} has been changed since it was written")
+    if tree["level"] != games.levels[0].model_dump_json():
+        raise ValueError(
+            f"the level {games.levels[0].name!r} has been changed since it was written"
+        )
     kept_for, tasks = np.array(tree["kept_for"], dtype=np.int64), len(own.success)
     _check_numbers("kept_for", kept_for, 0, tasks)
     _check_numbers("task", tree["task"], -1, tasks)
@@ -367,7 +369,7 @@ def _snapshot(tree: Tree, own: Snapshot, rows: int) -> Snapshot:
         if isinstance(value, np.ndarray)
     }
     _check_arrays(_flat(tree), {**wanted, **like})
-    game, route = _flat(tree["game"]), own.level.route
+    game, route = _flat(tree["game"]), own.levels[0].route
     # The compiled rules look these up without asking whether they are there.
     for name, numbers, count in (
         ("level_of_row", tree["level_of_row"], 1),

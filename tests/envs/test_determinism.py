@@ -17,7 +17,7 @@ MODES: list[dict[str, Any]] = [
     {"level": "gate", "observation": "dict", "reward": "shaped"},
 ]
 # Short enough for several resets, which draw from the rows' generators.
-LIMIT = {"max_episode_steps": 85}
+LIMIT: dict[str, Any] = {"max_episode_steps": 85}
 
 Trace = list[tuple[bytes, float, bool, bool]]
 

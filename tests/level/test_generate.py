@@ -30,7 +30,10 @@ def test_whatever_is_generated_loads_without_a_warning(seed: int, difficulty: fl
 def test_a_generated_level_is_the_same_for_ever() -> None:
     """Whoever has to change this makes another ``VERSION`` of the generator."""
     text = "".join(generate(seed, seed / 20).model_dump_json() for seed in range(21))
-    assert hashlib.sha256(text.encode()).hexdigest() == "583b833651cfb809b3012b495789d4c80d0c869ffbe8e4fc90f124b7031999d4"
+    assert (
+        hashlib.sha256(text.encode()).hexdigest()
+        == "583b833651cfb809b3012b495789d4c80d0c869ffbe8e4fc90f124b7031999d4"
+    )
 
 
 def test_generated_levels_compile_for_both_engines() -> None:

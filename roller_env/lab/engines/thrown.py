@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from roller_env.arrays import Float64
+from roller_env.game.tables import LevelTable
 from roller_env.level import Level
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.physics.protocol import Bodies, Path
@@ -26,7 +28,8 @@ class Thrown:
         """Make them; ``step_s`` is a multiple of the preset's ``dt_s``."""
         self.level, self.step_s = level, step_s
         substeps = round(step_s / preset.dt_s)
-        self._physics = make_physics(level, preset, count, substeps, num_threads=1)
+        table, level_of = LevelTable.of_levels([level]), np.zeros(count, dtype=np.int64)
+        self._physics = make_physics([level], table, level_of, preset, substeps, num_threads=1)
         self.bodies = Bodies.of(self._physics.state, self._physics.columns)
 
     def put(
