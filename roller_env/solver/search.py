@@ -45,6 +45,8 @@ _GREED: Final = 0.7
 STEP_S: Final = 0.1
 """Length of a control step of what is found."""
 
+_ROW: Final = np.zeros(1, dtype=np.int64)
+
 
 @dataclass(frozen=True, slots=True)
 class Solution:
@@ -85,11 +87,10 @@ class Search:
         self._simulation.seed([seeding.np_random(seed)[0] for _ in range(GAMES)])
         self._simulation.reset()
         self.coins = int(self._simulation.coins_in_level[0])
-        self.archive, self.best, self.steps = Archive(), None, 0
+        self.archive, self.steps = Archive(), 0
+        self.best: Solution | None = None
         start = Node(ROOT, np.zeros(0, dtype=np.int64), 0, 0, self._simulation.snapshot(_ROW))
         self.archive.put(cells(self._simulation)[0], start)
-
-    best: Solution | None
 
     def run(
         self, budget: int, all_coins: bool = False, told: Callable[[Search], None] | None = None
@@ -212,9 +213,6 @@ class Search:
         if not replay.result.success or replay.result.coins != solution.coins:
             raise RuntimeError(f"the play found does not repeat: {replay.result}")
         return replay
-
-
-_ROW: Final = np.zeros(1, dtype=np.int64)
 
 
 def solve(
