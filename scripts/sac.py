@@ -14,7 +14,7 @@ from __future__ import annotations
 import sys
 import time
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import torch
@@ -24,13 +24,14 @@ from stable_baselines3 import SAC
 
 from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.envs.vector import RollerVectorEnv
+from roller_env.game.actions import forces
 from roller_env.level import LevelError
 
 ENVS = 32
 UPDATES = 8
 """Of the networks in a step of all environments."""
 
-OPTIONS = {
+OPTIONS: dict[str, Any] = {
     "action": "force",
     "control_dt_s": 0.1,
     "max_episode_steps": 600,
@@ -89,16 +90,10 @@ def judged(model: SAC, level: str, games: int = 100) -> tuple[float, float]:
     while not simulation.state.over.all():
         actions, _ = model.predict(observations, deterministic=True)
         over = simulation.state.over
-        simulation.step(_forces(actions), hold=over)
+        simulation.step(forces("force", actions), hold=over)
         observations = simulation.observe()
     shares = simulation.results()["score_percent"] / 100.0
     return float(simulation.state.finished.mean()), float(np.mean(shares))
-
-
-def _forces(actions: np.ndarray) -> np.ndarray:
-    from roller_env.game.actions import forces
-
-    return forces("force", actions)
 
 
 if __name__ == "__main__":

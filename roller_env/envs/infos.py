@@ -102,6 +102,9 @@ def rows_of(told: Mapping[str, Any]) -> list[dict[str, Any]]:
             *columns, strict=True
         )
     ]
+    if LEVEL in told:
+        for info, number in zip(infos, told[LEVEL].tolist(), strict=True):
+            info[LEVEL] = number
     if TERMS in told:
         for row in np.flatnonzero(told[f"_{TERMS}"]):
             infos[row][TERMS] = {name: float(told[TERMS][name][row]) for name in REWARD_TERMS}

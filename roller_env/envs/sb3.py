@@ -68,7 +68,8 @@ class RollerVecEnv(VecEnv):
             level: name of a shipped level, path of a level file, or a `Level`.
             num_envs: number of games.
             seed: row i is seeded with ``seed + i`` at the first reset.
-            options: the other keywords of `roller_env.config.EnvConfig`.
+            options: the other keywords of `roller_env.config.EnvConfig`, and the ``levels`` of
+                `RollerVectorEnv`.
 
         Raises:
             TypeError: there is no option of that name, or the seed is no whole number.
