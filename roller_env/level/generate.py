@@ -312,3 +312,8 @@ class _Builder:
         x, y = (np.array(places[-1]) * PITCH_M).tolist()
         self.parts["start"] = {"at": (0.0, 0.0, _BALL_M), "jitter": (0.3, 0.3)}
         self.parts["finish"] = {"at": (x, y, heights[-1] + 0.6), "size": (0.9, 0.9, 1.2)}
+        points = [
+            (*(np.array(place) * PITCH_M).tolist(), height + _BALL_M)
+            for place, height in zip(places, heights, strict=True)
+        ]
+        self.parts["route"] = {"points": points}
