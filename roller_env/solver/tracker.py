@@ -26,10 +26,10 @@ _AHEAD: Final = 3
 _WINDOW: Final = 10
 """Control steps by which it may catch up at once."""
 
-_SPEED_S: Final = 0.3
+_SPEED_S: Final = 0.1
 """Seconds by which a difference of speeds counts as one of places."""
 
-_PACE_M: Final = 0.02
+_PACE_M: Final = 0.05
 """What a step out of the play's pace counts."""
 
 _ROLLING: Final = 1.4
