@@ -149,5 +149,6 @@ def draw(file: Path) -> Figure:
     axes.set(xscale="log", ylim=(-0.03, 1.03), xlabel="levels learnt on")
     axes.set_ylabel("share at the finish")
     chart.plain(axes.xaxis)
-    chart.legend_of(figure, axes)
+    axes.set_xticks(sorted(set(rows.levels)))
+    axes.legend(loc="center left", fontsize=9)
     return figure
