@@ -8,9 +8,7 @@ import pickle
 import gymnasium as gym
 import numpy as np
 import pytest
-from stable_baselines3 import PPO
 
-from roller_env.envs.sb3 import RollerVecEnv
 from roller_env.envs.vector import RollerVectorEnv
 from roller_env.level.generate import generate
 
@@ -137,21 +135,6 @@ def test_what_asks_for_one_level_is_refused() -> None:
     other.reset(seed=0)
     with pytest.raises(ValueError, match="snapshot: found one of level 'flat'"):
         env.set_state(other.get_state())
-
-
-def test_stable_baselines_learns_on_all_of_them() -> None:
-    envs = RollerVecEnv(
-        num_envs=8, levels=NAMES, physics="rigid", seed=0, reward="nearness", max_episode_steps=30
-    )
-    levels = set()
-    envs.reset()
-    for _ in range(70):
-        _, _, _, infos = envs.step(np.zeros(8, dtype=np.int64))
-        levels |= {info["level"] for info in infos}
-    assert levels == set(range(len(NAMES)))
-    model = PPO("MlpPolicy", envs, n_steps=16, batch_size=64, n_epochs=1, device="cpu")
-    model.learn(256)
-    assert model.num_timesteps == 256
 
 
 def test_gymnasium_makes_it() -> None:
