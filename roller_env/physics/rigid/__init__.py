@@ -8,7 +8,8 @@ engine goes from event to event:
 - `states`: the balls, and what is done to them; `workspace`: memory of the kernels;
 - `step`: the events in order, for any rows of balls;
 - `near`: what is near and what is touched; `slabs`: solids that move;
-- `closest`: the nearest point of a solid, and how long it stays on the same feature;
+- `closest`: the nearest point of a box or hull, and how long it stays on the same feature; `hull`:
+  what a convex polyhedron is made of;
 - `impact_time`: when a ball on a parabola first meets a solid (conservative advancement);
 - `events`: until when a motion goes on;
 - `coulomb`: impulses and forces at several contacts at once, with Coulomb's circular cone;
