@@ -179,17 +179,27 @@ def load_checkpoint(file: Path) -> Checkpoint:
         raise _damaged(file, "its content does not match its hash")
     try:
         facts, arrays = _members(body)
-        progress = facts["progress"]
         return Checkpoint(
             file=file,
             config=TrainingConfig.model_validate(facts["config"]),
-            progress=Progress(**progress),
+            progress=_progress(facts["progress"]),
             state=_nested({**facts["state"], **arrays}),
         )
     except (zipfile.BadZipFile, SafetensorError, ValidationError) as error:
         raise _damaged(file, str(error)) from None
     except (LookupError, TypeError, ValueError) as error:
         raise _damaged(file, f"{type(error).__name__}: {error}") from None
+
+
+def _progress(told: Mapping[str, Any]) -> Progress:
+    """Return the progress that a checkpoint tells of; of one without a mastery, none."""
+    final_from = told.get("final_from")
+    return Progress(
+        steps=int(told["steps"]),
+        wall_s=float(told["wall_s"]),
+        mastery=float(told.get("mastery", 0.0)),
+        final_from=None if final_from is None else int(final_from),
+    )
 
 
 def _members(body: bytes) -> tuple[Any, dict[str, npt.NDArray[Any]]]:

@@ -12,7 +12,7 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
-from stable_baselines3.common.utils import LinearSchedule
+from stable_baselines3.common.utils import ConstantSchedule, LinearSchedule
 from stable_baselines3.common.vec_env import VecNormalize
 
 from roller_env.envs.infos import TERMS
@@ -120,6 +120,12 @@ def make_environments(config: TrainingConfig) -> StartStateCurriculum:
     return StartStateCurriculum(environments, fraction, config.seed, explorers)
 
 
+def _learning_rate(config: TrainingConfig) -> LinearSchedule:
+    """Return the learning rate by how much is left of what changes it, 1 to 0."""
+    end = 0.0 if config.ppo.learning_rate_decay == "linear" else config.ppo.learning_rate
+    return LinearSchedule(config.ppo.learning_rate, end, end_fraction=1.0)
+
+
 def new_model(config: TrainingConfig, environments: StartStateCurriculum) -> PPO:
     """Return a learner that knows nothing yet."""
     normaliser = VecNormalize(
@@ -132,7 +138,7 @@ def new_model(config: TrainingConfig, environments: StartStateCurriculum) -> PPO
     return PPO(
         network_class(config),
         normaliser,
-        learning_rate=_LearningRate(config),
+        learning_rate=_learning_rate(config),
         n_steps=ppo.rollout_steps,
         batch_size=ppo.batch_size,
         n_epochs=ppo.epochs,
@@ -147,25 +153,6 @@ def new_model(config: TrainingConfig, environments: StartStateCurriculum) -> PPO
         seed=config.seed,
         device="cpu",
     )
-
-
-class _LearningRate:
-    """The learning rate; SB3 knows how far a training is only of those that end at a known step.
-
-    Attributes:
-        progress: of the training, before the rollout that is learnt from.
-    """
-
-    def __init__(self, config: TrainingConfig) -> None:
-        self.progress = Progress()
-        self._config, ppo = config, config.ppo
-        end = 0.0 if ppo.learning_rate_decay == "linear" else ppo.learning_rate
-        self._linear = LinearSchedule(ppo.learning_rate, end, end_fraction=1.0)
-
-    def __call__(self, progress_remaining: float) -> float:
-        if self._config.mastery is None:
-            return self._linear(progress_remaining)
-        return self._linear(1.0 - finality(self._config, self.progress))
 
 
 class _BudgetSpent(Exception):
@@ -231,14 +218,15 @@ class _Recorder(BaseCallback):
         if is_complete(self._config, self.progress):
             raise _BudgetSpent
         assert isinstance(self.model, PPO)
-        assert isinstance(self.model.learning_rate, _LearningRate)
-        self.model.learning_rate.progress = self.progress
         begin, end = (
             self._config.ppo.entropy_coefficient,
             self._config.ppo.final_entropy_coefficient,
         )
         if self._config.mastery is not None:
             begin *= 1.0 - self.progress.mastery
+            # SB3 knows how far a training is only of those that end at a known step.
+            left = 1.0 - finality(self._config, self.progress)
+            self.model.lr_schedule = ConstantSchedule(_learning_rate(self._config)(left))
         if end is not None:
             done = finality(self._config, self.progress)
             self.model.ent_coef = begin + (end - begin) * done

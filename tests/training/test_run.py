@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import runpy
@@ -9,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -357,6 +359,21 @@ def test_a_training_ends_when_the_likeliest_actions_have_mastered_the_level(
     assert progress.steps == steps
     goes_on = capsys.readouterr().out.count("by its likeliest actions 20% are mastered: it goes on")
     assert goes_on == sum(share < 0.5 for share in judged[: len(judged) - len(list(found))])
+
+
+def test_what_stable_baselines_keeps_of_an_agent_opens_without_roller(tmp_path: Path) -> None:
+    config = small_config(total_steps=UPDATE, mastery=0.5)
+    files = RunFiles(tmp_path)
+    learn_to_mastery(config, files)
+    with zipfile.ZipFile(files.sb3_policy) as kept:
+        fields = json.loads(kept.read("data"))
+    pickles = {
+        name: base64.b64decode(value[":serialized:"])
+        for name, value in fields.items()
+        if isinstance(value, dict) and ":serialized:" in value
+    }
+    assert {"policy_class", "lr_schedule"} <= pickles.keys()
+    assert [name for name, pickle in pickles.items() if b"roller_env" in pickle] == []
 
 
 def test_rates_stay_until_the_end_and_go_to_their_last_values_there() -> None:
