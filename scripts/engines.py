@@ -10,15 +10,14 @@ Examples::
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import tyro
-from tqdm import tqdm
 
 from roller_env.lab.engines import report
-from roller_env.lab.runner import provenance
+from roller_env.lab.runner import provenance, watched
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,19 +39,12 @@ def main(arguments: Arguments) -> None:
     if arguments.docs and arguments.quick:
         raise ValueError("--docs: publishes full runs; leave out --quick")
     effort = report.QUICK if arguments.quick else report.FULL
-    measured = report.measure(effort, _progress)
+    measured = report.measure(effort, partial(watched, unit="part"))
     files = report.write(measured, provenance(), arguments.out)
     print(*report.summary(measured), sep="\n")
     print(f"{len(files)} files in {arguments.out}")
     if arguments.docs:
         print("brought up to date:", *report.publish(arguments.out, arguments.docs))
-
-
-def _progress(names: Sequence[str]) -> Iterable[str]:
-    with tqdm(names, unit="part", dynamic_ncols=True) as bar:
-        for name in bar:
-            bar.set_postfix_str(name)
-            yield name
 
 
 if __name__ == "__main__":

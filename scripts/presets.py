@@ -11,18 +11,18 @@ Examples::
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import tyro
-from tqdm import tqdm
 
 from roller_env.lab.presets import report
 from roller_env.lab.presets.costs import ablations
 from roller_env.lab.presets.report import FULL, QUICK
 from roller_env.lab.presets.settings import SETTINGS
-from roller_env.lab.runner import known, provenance
+from roller_env.lab.runner import known, provenance, watched
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ def main(arguments: Arguments) -> None:
     effort = QUICK if arguments.quick else FULL
     if arguments.only:
         effort = replace(effort, settings=_checked(arguments.only))
-    rows = report.measure(effort, _progress)
+    rows = report.measure(effort, partial(watched, unit="setting"))
     modelled = ablations(effort.rounds, effort.boxes, effort.games)
     files = report.write(rows, modelled, provenance(), arguments.out)
     print(*report.summary(rows, modelled), sep="\n")
@@ -62,13 +62,6 @@ def _checked(names: Sequence[str]) -> tuple[str, ...]:
     for name in names:
         known("setting", name, list(SETTINGS))
     return tuple(dict.fromkeys(names))
-
-
-def _progress(names: Sequence[str]) -> Iterable[str]:
-    with tqdm(names, unit="setting", dynamic_ncols=True) as bar:
-        for name in bar:
-            bar.set_postfix_str(name)
-            yield name
 
 
 if __name__ == "__main__":

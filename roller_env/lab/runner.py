@@ -12,7 +12,7 @@ import platform
 import sys
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from difflib import get_close_matches
@@ -23,6 +23,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 from pandas import DataFrame as Frame
+from tqdm import tqdm
 
 from roller_env import __version__
 
@@ -185,6 +186,14 @@ def _version(name: str) -> str:
         return version(name)
     except PackageNotFoundError:
         return "not installed"
+
+
+def watched(names: Sequence[str], unit: str) -> Iterator[str]:
+    """Yield names while a bar says which is at work."""
+    with tqdm(names, unit=unit, dynamic_ncols=True) as bar:
+        for name in bar:
+            bar.set_postfix_str(name)
+            yield name
 
 
 def known(what: str, name: str, names: Sequence[str]) -> str:

@@ -2,8 +2,8 @@
 
 A level is a self-avoiding walk from platform to platform. What joins two of them is a plank, a
 ramp, a step down, a gap with the far side lower, or a plank with a gate whose plate lies on a
-platform before it. Side platforms with coins branch off, and planks close loops. Whether a level
-can be won is not asked here: `roller_env.solver.generated_level` hands out those that were.
+platform before it. Side platforms with coins branch off. Whether a level can be won is not asked
+here: `roller_env.solver.won_level` hands out those that were.
 
 The same seed and difficulty give the same level for ever, under one `VERSION`.
 """
@@ -290,7 +290,7 @@ class _Builder:
         return len(self.parts["gates"])
 
     def _branch_off(self, places: list[Place], heights: list[float]) -> None:
-        """Add side platforms with coins, and planks between platforms that lie side by side."""
+        """Add side platforms with coins."""
         rng, taken = self._rng, set(places)
         for number, place in enumerate(places[:-1]):
             if rng.random() >= self._knobs.branches:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -92,20 +91,15 @@ class Search:
         start = Node(ROOT, np.zeros(0, dtype=np.int64), 0, 0, self._simulation.snapshot(_ROW))
         self.archive.put(cells(self._simulation)[0], start)
 
-    def run(
-        self, budget: int, all_coins: bool = False, told: Callable[[Search], None] | None = None
-    ) -> Solution | None:
+    def run(self, budget: int, all_coins: bool = False) -> Solution | None:
         """Search until the finish is found, or all coins with it, or the budget is spent.
 
         Args:
             budget: environment steps in all.
             all_coins: go on until the best has every coin.
-            told: is called after each leg.
         """
         while self.steps < budget:
             self._leg()
-            if told is not None:
-                told(self)
             if self.best is not None and (not all_coins or self.best.coins == self.coins):
                 break
         return self.best

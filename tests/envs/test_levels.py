@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import pickle
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -16,9 +17,13 @@ NAMES = ("flat", "gate", "lift", "classic", "bridge")
 ROWS = 20
 
 
-def several(**options: object) -> RollerVectorEnv:
-    given = {"physics": "rigid", "autoreset_mode": "SameStep", "num_threads": 1} | options
-    return RollerVectorEnv(ROWS, levels=NAMES, **given)  # type: ignore[arg-type]
+def several(**options: Any) -> RollerVectorEnv:
+    given: dict[str, Any] = {
+        "physics": "rigid",
+        "autoreset_mode": "SameStep",
+        "num_threads": 1,
+    } | options
+    return RollerVectorEnv(ROWS, levels=NAMES, **given)
 
 
 def actions(steps: int) -> list[np.ndarray]:

@@ -44,6 +44,18 @@ def integrated(
     return end
 
 
+@dataclass(frozen=True, slots=True)
+class _Falls:
+    """An event of ``solve_ivp`` that ends it: a value falls through 0."""
+
+    value: Callable[[float, Float64], float]
+    terminal: bool = True
+    direction: float = -1.0
+
+    def __call__(self, time: float, state: Float64) -> float:
+        return self.value(time, state)
+
+
 class Pivot:
     """A ball on an edge or a corner: it rolls until it slips, slips until it lifts, and flies.
 
@@ -60,24 +72,19 @@ class Pivot:
     def run(self, state: Float64, duration: float, phase: str = "rolls") -> Float64:
         """Return position, velocity and angular velocity, (9,), after ``duration`` seconds."""
         time = 0.0
-        ends: dict[str, Callable[[float, Float64], float]] = {
-            "rolls": lambda _, y: self._room(y),
-            "slips": lambda _, y: self._forces(y, True)[0],
+        ends = {
+            "rolls": _Falls(lambda _, y: self._room(y)),
+            "slips": _Falls(lambda _, y: self._forces(y, True)[0]),
         }
         following = {"rolls": "slips", "slips": "flies"}
         while True:
             self.phases.append(phase)
-            events = []
-            if phase in ends:
-                end = ends[phase]
-                end.terminal, end.direction = True, -1.0  # type: ignore[attr-defined]
-                events = [end]
             done = solve_ivp(
                 lambda _, y, phase=phase: self._rates(y, phase),
                 (time, duration),
                 state,
                 "DOP853",
-                events=events,
+                events=[ends[phase]] if phase in ends else [],
                 rtol=RELATIVE,
                 atol=ABSOLUTE,
             )
