@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import os
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -32,9 +32,10 @@ from roller_env.lab.runner import provenance
 class Arguments:
     """Make the trainings of an experiment that are missing, and print its tables."""
 
-    experiment: Annotated[Literal["seeds", "factors"], tyro.conf.Positional] = "seeds"
-    """seeds: the recipe on every level with the seeds 40 to 49; factors: what is left of it when
-    one thing is changed, on flat and bridge."""
+    experiment: Annotated[Literal["seeds", "factors", "transfer"], tyro.conf.Positional] = "seeds"
+    """seeds: the recipe on every level with the seeds 50 to 59; factors: what is left of it when
+    one thing is changed, on flat and bridge; transfer: agents trained on one physics, judged on
+    four, on classic and flat."""
 
     show: bool = False
     """Print the tables and draw the charts of what is there; train nothing."""
@@ -63,13 +64,16 @@ def main(arguments: Arguments) -> None:
     if arguments.seeds is not None:
         few = sorted({trial.seed for trial in experiment.trials})[: arguments.seeds]
         kept = tuple(trial for trial in experiment.trials if trial.seed in few)
-        experiment = trainings.Experiment(kept, experiment.changes)
+        experiment = replace(experiment, trials=kept)
     stem = arguments.out / arguments.experiment
     if not arguments.show:
         bar = lambda trials, count: tqdm(trials, total=count, dynamic_ncols=True)  # noqa: E731
         trainings.run(experiment, arguments.recipe, stem, arguments.jobs, bar)
     if arguments.experiment == "factors":
         print(trainings.factors_table(stem))
+        return
+    if arguments.experiment == "transfer":
+        print(trainings.transfer_table(stem))
         return
     print(trainings.seeds_table(stem))
     print(trainings.each_seed_table(stem))

@@ -12,7 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Final
@@ -22,6 +22,7 @@ import pandas
 from matplotlib.figure import Figure
 
 from roller_env import __version__
+from roller_env.game.result import EpisodeResult
 from roller_env.lab import chart
 from roller_env.lab.table import Frame, markdown
 from roller_env.training import load_config
@@ -63,6 +64,16 @@ FACTORS: Final[Mapping[str, tuple[str, ...]]] = {
 """Variants of the recipe by their names, and what each changes: one thing."""
 
 
+PHYSICS: Final = ("rigid", "relaxed", "fast", "default")
+"""Engines of which an agent is trained on one and judged on all."""
+
+TRANSFER: Final[Mapping[str, tuple[str, ...]]] = {
+    f"trained on {physics}": (f"environment.physics={physics}",) for physics in PHYSICS
+}
+
+VARIANTS: Final = {**FACTORS, **TRANSFER}
+
+
 @dataclass(frozen=True, slots=True)
 class Trial:
     """One training: which variant of the recipe, on which level, with which seed."""
@@ -84,10 +95,12 @@ class Experiment:
     Attributes:
         trials: in the order in which they are made.
         changes: overrides of the recipe for all of them.
+        judged_on: physics presets on which the agents play besides the evaluation's own.
     """
 
     trials: tuple[Trial, ...]
     changes: tuple[str, ...] = ()
+    judged_on: tuple[str, ...] = ()
 
 
 EXPERIMENTS: Final[Mapping[str, Experiment]] = {
@@ -103,6 +116,16 @@ EXPERIMENTS: Final[Mapping[str, Experiment]] = {
         ),
         ("total_steps=1000000",),
     ),
+    "transfer": Experiment(
+        tuple(
+            Trial(variant, level, seed)
+            for seed in range(3)
+            for level in ("classic", "flat")
+            for variant in TRANSFER
+        ),
+        ("total_steps=2500000",),
+        PHYSICS,
+    ),
 }
 
 QUICK: Final = Experiment(
@@ -115,6 +138,7 @@ QUICK: Final = Experiment(
         "evaluation_episodes=4",
         "environment.max_episode_steps=100",
     ),
+    ("fast", "rigid"),
 )
 """An experiment of seconds that shows nothing but that it works."""
 
@@ -140,7 +164,7 @@ def run(
     stem.parent.mkdir(parents=True, exist_ok=True)
     # A process for each: what one leaves behind in PyTorch or Numba is not the next one's.
     with ProcessPoolExecutor(jobs, get_context("spawn"), max_tasks_per_child=1) as pool:
-        trials = [pool.submit(_tried, trial, experiment.changes, recipe) for trial in missing]
+        trials = [pool.submit(_tried, trial, experiment, recipe) for trial in missing]
         for trial in progress(as_completed(trials), len(trials)):
             row, curve = trial.result()
             # The curve first: a trial whose row is there is whole.
@@ -172,11 +196,11 @@ def _append(file: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _tried(
-    trial: Trial, changes: Sequence[str], recipe: Path
+    trial: Trial, experiment: Experiment, recipe: Path
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Return a trial's row and its learning curve."""
     own = (f"level={trial.level}", f"seed={trial.seed}", "checkpoint_interval_s=1e9")
-    config = load_config(recipe, (*own, *changes, *FACTORS[trial.variant]))
+    config = load_config(recipe, (*own, *experiment.changes, *VARIANTS[trial.variant]))
     names = {"variant": trial.variant, "level": trial.level, "seed": trial.seed}
     with tempfile.TemporaryDirectory() as directory:
         files = RunFiles(Path(directory))
@@ -185,12 +209,20 @@ def _tried(
         wall_s, cpu_s = time.monotonic() - start_s, time.process_time() - cpu_s
         policy = load_policy(files.directory)
         evaluation = evaluate_policy(policy, config, config.evaluation_episodes)
+        elsewhere: dict[str, float] = {}
+        for physics in experiment.judged_on:
+            changed = replace(config.evaluation_environment, physics=physics)
+            there = config.model_copy(update={"evaluation_environment": changed})
+            others = evaluate_policy(policy, there, config.evaluation_episodes).results
+            finish, coins = shares(others)
+            elsewhere |= {f"finish on {physics}": finish, f"coins on {physics}": coins}
         curve = list(_thinned(read_progress(files.progress), evaluation.coins_in_level))
     results = evaluation.results
+    finish, coins = shares(results)
     row = names | {
         "steps": progress.steps,
-        "finish": round(float(np.mean([result.success for result in results])), 4),
-        "coins": round(float(np.mean([result.score_percent for result in results])) / 100, 4),
+        "finish": finish,
+        "coins": coins,
         "falls": round(float(np.mean([result.fall for result in results])), 4),
         "time_s": round(float(np.mean([result.time_s for result in results])), 2),
         "train_wall_s": round(wall_s, 1),
@@ -198,7 +230,14 @@ def _tried(
         "roller": __version__,
         "processors": os.cpu_count(),
     }
-    return row, [names | point for point in curve]
+    return row | elsewhere, [names | point for point in curve]
+
+
+def shares(results: Sequence[EpisodeResult]) -> tuple[float, float]:
+    """Return the shares of the games at the finish, and of the coins."""
+    finish = float(np.mean([result.success for result in results]))
+    coins = float(np.mean([result.score_percent for result in results])) / 100
+    return round(finish, 4), round(coins, 4)
 
 
 _POINTS: Final = 30
@@ -274,6 +313,20 @@ def factors_table(stem: Path) -> str:
             row[f"{level}: seeds"] = str(len(own))
         rows.append(row)
     return markdown(Frame(rows).fillna("-"))
+
+
+def transfer_table(stem: Path) -> str:
+    """Return, as Markdown, how agents of each physics play on every other, means of the seeds."""
+    results = _frame(_results(stem))
+    judged = [column.removeprefix("finish on ") for column in results if "finish on" in column]
+    rows = []
+    for (level, variant), own in results.groupby(["level", "variant"], sort=False):
+        row = {"level": level, "": variant, "seeds": str(len(own))}
+        for physics in judged:
+            finish, coins = own[f"finish on {physics}"].mean(), own[f"coins on {physics}"].mean()
+            row[f"on {physics}"] = f"{_percent(finish)} / {_percent(coins)}"
+        rows.append(row)
+    return markdown(Frame(rows))
 
 
 def _frame(file: Path) -> Frame:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from roller_env.lab import trainings
+from roller_env.lab import learners, trainings
 from roller_env.lab.chart import save
 from roller_env.training import load_config
 
@@ -42,6 +42,7 @@ def test_what_is_there_is_not_trained_again(quick: Path) -> None:
 def test_the_tables_and_the_chart_are_made_from_the_rows(quick: Path, tmp_path: Path) -> None:
     assert "| flat |" in trainings.seeds_table(quick)
     assert "gamma 0.99" in trainings.factors_table(quick)
+    assert "on fast | on rigid |" in trainings.transfer_table(quick)
     picture, _ = save(trainings.draw_curves(quick, "note"), {}, tmp_path / "curves")
     assert picture.stat().st_size > 10_000
 
@@ -60,6 +61,13 @@ def test_a_level_is_learnt_where_finish_and_coins_are_both_good(tmp_path: Path) 
 
 def test_every_factor_changes_the_recipe_and_is_a_configuration() -> None:
     recipe = load_config(RECIPE)
-    for variant, changes in trainings.FACTORS.items():
+    for variant, changes in trainings.VARIANTS.items():
         changed = load_config(RECIPE, changes)
-        assert (changed == recipe) == (variant == trainings.RECIPE), variant
+        same = variant in {trainings.RECIPE, "trained on relaxed"}
+        assert (changed == recipe) == same, variant
+
+
+def test_an_off_policy_learner_plays_the_same_games() -> None:
+    row = learners.row("SAC", "flat", 0, 640, load_config(RECIPE, ["evaluation_episodes=2"]))
+    assert row["steps"] == 640
+    assert 0.0 <= row["coins"] <= 1.0
