@@ -13,7 +13,7 @@ from pydantic import JsonValue
 from roller_env import checks
 from roller_env.game.actions import ActionMode
 from roller_env.game.cameras import MODES
-from roller_env.game.observations import ObservationMode
+from roller_env.game.observations import Kinds, ObservationMode
 from roller_env.game.rewards import RewardMode, RewardWeights
 from roller_env.level import Level, load_level
 from roller_env.level.load import is_path
@@ -43,6 +43,9 @@ class EnvConfig:
         action: ``directions`` (Discrete(9): nothing, then forward and round to the left),
             ``keys`` (MultiBinary(4): W A S D) or ``force`` (Box(2): -1 to 1 of a key's force).
         observation: ``state``, ``rays``, ``dict`` or ``pixels``.
+        kinds: whose entries an observation has besides those of coins, plates, gates, lift pads
+            and the finish: ``level`` (of what the level has) or ``all`` (of everything there is, so
+            that an agent can go from level to level).
         reward: ``points`` or ``shaped`` (points and potential-based progress along the route).
         reward_weights: what coins, finish, fall and progress are worth.
         discount: gamma of the shaping; give the same to the training algorithm.
@@ -62,6 +65,7 @@ class EnvConfig:
     level: LevelSource = "classic"
     action: ActionMode = "directions"
     observation: ObservationMode = "state"
+    kinds: Kinds = "level"
     reward: RewardMode = "points"
     reward_weights: RewardWeights = field(default_factory=RewardWeights)
     discount: float = 0.99
@@ -84,6 +88,7 @@ class EnvConfig:
                 "observation": lambda: one_of(
                     "observation", self.observation, get_args(ObservationMode)
                 ),
+                "kinds": lambda: one_of("kinds", self.kinds, get_args(Kinds)),
                 "reward": lambda: one_of("reward", self.reward, get_args(RewardMode)),
                 "reward_weights": lambda: checks.record(
                     "reward_weights", RewardWeights, self.reward_weights

@@ -24,6 +24,7 @@ from roller_env.game.step import Games, Rewarding
 from roller_env.game.tables import LevelTable
 from roller_env.level import Level, load_level
 from roller_env.level.check import obstacles, obstructions
+from roller_env.level.expand import expand
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.physics.protocol import Bodies, Columns, Path, Physics
 from roller_env.pieces.coin import COIN
@@ -228,7 +229,9 @@ class Simulation:
         config, num_envs = self.config, self.num_envs
         self.preset = config.preset
         self._duration_s = config.substeps * self.preset.dt_s
-        self.table = LevelTable.of_levels(self.levels)
+        expanded = [expand(level) for level in self.levels]
+        self.entries = observations.entries(config.observation, config.kinds, expanded)
+        self.table = LevelTable.of_levels(self.levels, config.kinds)
         level_of = np.zeros(num_envs, dtype=np.int64)
         self._games = Games(self.table, level_of, self._episode_lengths(level_of))
         self.state = self._games.state
@@ -604,11 +607,10 @@ class Simulation:
     def observe(self, rows: Int64 | None = None) -> Float32:
         """Return the observation vectors of ``rows`` (all, if None), (n, size) float32.
 
-        They are laid out as `roller_env.game.observations.entries` of the configured mode says.
+        They are laid out as `entries` says.
         """
         envs = self._every if rows is None else np.asarray(rows)
-        size = sum(entry.size for entry in observations.entries(self.config.observation))
-        out = np.zeros((len(envs), size), dtype=np.float32)
+        out = np.zeros((len(envs), sum(entry.size for entry in self.entries)), dtype=np.float32)
         rays = self.config.observation == "rays"
 
         def show(share: slice) -> None:
@@ -616,7 +618,7 @@ class Simulation:
             if rays:
                 whole = rows is None and len(envs[share]) == self.num_envs
                 seen = self._cast_rays(None if whole else envs[share], envs[share])
-                out[share, observations.STATE_SIZE :] = seen
+                out[share, -seen.shape[1] :] = seen
 
         size = -(-len(envs) // len(self._parts)) or 1
         self._workers.share(

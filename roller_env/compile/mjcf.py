@@ -56,15 +56,14 @@ def build_spec(level: Level, preset: PhysicsPreset) -> mujoco.MjSpec:
     _add_ball(spec, level)
     everything = expand(level)
     merged = merge_solids(everything.ground)
-    names = {solid.material for solid in merged}
+    names = {solid.material for solid in (*merged, *everything.at_the_start)}
     contacts = {name: _contact(level, preset, level.material(name)) for name in names}
     for number, solid in enumerate(merged):
         _add_solid(spec, solid, contacts[solid.material], f"solid_{number}_{solid.material}")
-    smooth = _contact(level, preset, level.material(""))
     for solid in everything.machines:
-        _add_solid(spec, solid, smooth, machine_name(solid))
+        _add_solid(spec, solid, contacts[solid.material], machine_name(solid))
     for mover in everything.movers:
-        _add_mover(spec, level, mover, smooth)
+        _add_mover(spec, level, mover, contacts[mover.solid.material])
     if len(spec.geoms) <= MIDPHASE_GEOMS:
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     return spec
@@ -151,7 +150,7 @@ def _add_solid(spec: mujoco.MjSpec, solid: Solid, contact: dict[str, object], na
 
 
 def _add_mover(spec: mujoco.MjSpec, level: Level, mover: Mover, contact: dict[str, object]) -> None:
-    """Add a slab that an integrated-velocity servo moves down its slide joint to its stop.
+    """Add a slab that an integrated-velocity servo moves along its slide joint.
 
     The servo's control is the slab's velocity in m/s; its activation is the set-point, clamped
     where the slab stands still.
@@ -165,7 +164,9 @@ def _add_mover(spec: mujoco.MjSpec, level: Level, mover: Mover, contact: dict[st
         quat=quaternion(np.array(solid.rotation)),
         gravcomp=1.0,
     )
-    body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0.0, 0.0, 1.0])
+    # The joint's axis is the body's.
+    axis = np.array(mover.along) @ np.array(solid.rotation)
+    body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=axis)
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_BOX,

@@ -30,7 +30,7 @@ from roller_env.physics.rigid.states import (
 )
 from roller_env.physics.rigid.step import advance
 from roller_env.physics.rigid.workspace import make_workspace
-from roller_env.pieces.piece import Solid
+from roller_env.pieces.piece import UPWARDS, Solid
 
 CAP_S = 1 / 120
 """Longest step where motions have no closed form."""
@@ -61,6 +61,8 @@ def rigid_level(
     numbers = range(len(expanded.movers)) if slots is None else slots
     stops = np.zeros(max(slabs, len(expanded.movers)))
     stops[list(numbers)] = [mover.travel for mover in expanded.movers]
+    along = np.tile(UPWARDS, (len(stops), 1))
+    along[list(numbers)] = np.array([mover.along for mover in expanded.movers]).reshape(-1, 3)
 
     def box(solid: Solid, slab: int = STATIC) -> SolidBox:
         material = level.material(solid.material)
@@ -86,6 +88,7 @@ def rigid_level(
         gravity=level.gravity,
         mass=level.ball.mass_kg,
         slab_stop=stops.tolist(),
+        slab_along=along.tolist(),
         law=law,
     )
 

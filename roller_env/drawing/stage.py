@@ -189,7 +189,9 @@ class _Machine(NamedTuple):
             return None
         for mover in movers:
             if mover.solid.source == source:
-                return _Machine(piece, number, model.geom(mover.name).id, mover.stop, parts)
+                return _Machine(
+                    piece, number, model.geom(mover.name).id, mover.end.centre[2], parts
+                )
         return _Machine(piece, number, None, 0.0, parts)
 
 

@@ -55,7 +55,7 @@ class RollerEnv(gym.Env[Any, Any]):
         self._spec: EnvSpec | None = None
         self.simulation = Simulation(self.config, num_envs=1)
         self.action_space = spaces.action_space(self.config)
-        self.observation_space = spaces.observation_space(self.config)
+        self.observation_space = spaces.observation_space(self.config, self.simulation.entries)
         self.render_mode = self.config.render_mode
         self.metadata = {**self.metadata, "render_fps": round(1.0 / self.config.control_dt_s)}
         self._renderer: GameRenderer | None = None
@@ -147,7 +147,9 @@ class RollerEnv(gym.Env[Any, Any]):
     def _observation(self) -> Any:
         if self.config.observation == "pixels":
             return self._picture()
-        return spaces.shape_observation(self.config, self.simulation.observe()[0])
+        return spaces.shape_observation(
+            self.config, self.simulation.entries, self.simulation.observe()[0]
+        )
 
     def _picture(self) -> UInt8:
         if self._renderer is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, cast, get_args
 
 import gymnasium as gym
@@ -17,6 +18,9 @@ from roller_env.game.actions import (
     ActionMode,
     action_of_keys,
 )
+from roller_env.level import load_level
+from roller_env.level.expand import expand
+from roller_env.pieces.rules import Entry
 
 Space = gym.Space[Any]
 Observations = Float32 | dict[str, Float32]
@@ -40,11 +44,21 @@ def action_mode(space: Space) -> ActionMode | None:
     return None
 
 
-def observation_space(config: EnvConfig) -> Space:
-    """Return the observation space of one game."""
+def entries_of(config: EnvConfig) -> tuple[Entry, ...]:
+    """Return what is observed of one game on the level of the options.
+
+    Raises:
+        LevelError: the level is not valid.
+    """
+    if config.kinds == "all" or config.observation == "pixels":
+        return observations.entries(config.observation, config.kinds)
+    return observations.entries(config.observation, levels=[expand(load_level(config.level))])
+
+
+def observation_space(config: EnvConfig, parts: Sequence[Entry]) -> Space:
+    """Return the observation space of one game, which has these entries."""
     if config.observation == "pixels":
         return gym.spaces.Box(0, 255, (config.height, config.width, 3), np.uint8)
-    parts = observations.entries(config.observation)
     boxes: dict[str, Space] = {
         entry.name: gym.spaces.Box(
             np.float32(entry.low), np.float32(entry.high), (entry.size,), np.float32
@@ -56,11 +70,9 @@ def observation_space(config: EnvConfig) -> Space:
     return gym.spaces.flatten_space(gym.spaces.Tuple(list(boxes.values())))
 
 
-def shape_observation(config: EnvConfig, vectors: Float32) -> Any:
+def shape_observation(config: EnvConfig, parts: Sequence[Entry], vectors: Float32) -> Any:
     """Return observation vectors, (..., size), in the shape of the configured mode."""
-    if config.observation == "dict":
-        return observations.split(vectors, observations.entries("dict"))
-    return vectors
+    return observations.split(vectors, parts) if config.observation == "dict" else vectors
 
 
 def row_of(observation: Any, row: int) -> Any:

@@ -70,7 +70,9 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         self.simulation = Simulation(self.config, num_envs, levels)
         self.num_envs = self.simulation.num_envs
         self.single_action_space = spaces.action_space(self.config)
-        self.single_observation_space = spaces.observation_space(self.config)
+        self.single_observation_space = spaces.observation_space(
+            self.config, self.simulation.entries
+        )
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.render_mode = self.config.render_mode
@@ -224,7 +226,9 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         if self.config.observation == "pixels":
             numbers = range(self.num_envs) if rows is None else rows
             return np.stack([self.picture(int(row)) for row in numbers])
-        return spaces.shape_observation(self.config, self.simulation.observe(rows))
+        return spaces.shape_observation(
+            self.config, self.simulation.entries, self.simulation.observe(rows)
+        )
 
     def _reset_now(self, rows: Int64, observation: Any) -> tuple[Any, dict[str, Any]]:
         """Reset ``rows``; return the observations with theirs replaced, and the vector info."""

@@ -58,7 +58,12 @@ def _only(hook: Hook, number: int) -> AllHooks:
     @spliced
     def call(now: Any, tables: tuple[Any, ...], states: tuple[Any, ...], owns: Int64) -> None:
         own = Own(
-            owns[number, 0], owns[number, 1], owns[number, 2], owns[number, 3], owns[number, 4]
+            owns[number, 0],
+            owns[number, 1],
+            owns[number, 2],
+            owns[number, 3],
+            owns[number, 4],
+            owns[number, 5],
         )
         hook(now, tables[number], states[number], own)
 

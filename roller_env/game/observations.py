@@ -14,9 +14,12 @@ import numpy as np
 from roller_env.arrays import Float32, Float64
 from roller_env.compiled import device_function
 from roller_env.game.kinds import RULES
+from roller_env.pieces.piece import ExpandedLevel
 from roller_env.pieces.rules import Entry, fraction_entry
 
 ObservationMode = Literal["state", "rays", "dict", "pixels"]
+Kinds = Literal["level", "all"]
+"""Whose entries are shown besides those of the basic kinds: what the levels have, or everything."""
 
 HORIZONTAL_RAYS: Final = 16
 RAY_RANGE_M: Final = 20.0
@@ -40,10 +43,15 @@ BALL_ENTRIES: Final = (
 
 STATE_ENTRIES: Final = (
     *BALL_ENTRIES,
-    *(entry for rules in RULES for entry in rules.entries),
+    *(entry for rules in RULES if rules.is_basic for entry in rules.entries),
     fraction_entry("time_left", "share of the time limit that is left"),
 )
-"""The ball's, those of every kind of piece in their order, and the time."""
+"""The ball's, those of the basic kinds of pieces in their order, and the time: of every level."""
+
+MORE_ENTRIES: Final = tuple(
+    entry for rules in RULES if not rules.is_basic for entry in rules.entries
+)
+"""Those of the other kinds, which come next, each where there are such pieces."""
 
 RAY_ENTRIES: Final = (
     Entry(
@@ -70,11 +78,27 @@ RAY_ENTRIES: Final = (
 )
 
 
-def entries(mode: ObservationMode) -> tuple[Entry, ...]:
-    """Return the entries of an observation mode in order; none for ``pixels``."""
+def state_entries(levels: Iterable[ExpandedLevel]) -> tuple[Entry, ...]:
+    """Return the entries of the state of games on some levels, in order."""
+    there = {kind.rules for level in levels for kind in level.pieces}
+    more = [e for rules in RULES if rules in there and not rules.is_basic for e in rules.entries]
+    return (*STATE_ENTRIES, *more)
+
+
+def entries(
+    mode: ObservationMode, kinds: Kinds = "level", levels: Iterable[ExpandedLevel] = ()
+) -> tuple[Entry, ...]:
+    """Return the entries of an observation in order; none of ``pixels``.
+
+    Args:
+        mode: how it is observed.
+        kinds: whose entries are shown besides those of the basic kinds.
+        levels: that are played.
+    """
     if mode == "pixels":
         return ()
-    return STATE_ENTRIES + RAY_ENTRIES if mode == "rays" else STATE_ENTRIES
+    state = STATE_ENTRIES + MORE_ENTRIES if kinds == "all" else state_entries(levels)
+    return state + RAY_ENTRIES if mode == "rays" else state
 
 
 def layout(parts: Iterable[Entry]) -> dict[str, slice]:
@@ -87,6 +111,7 @@ def layout(parts: Iterable[Entry]) -> dict[str, slice]:
 
 
 STATE_SIZE: Final = sum(entry.size for entry in STATE_ENTRIES)
+"""Of the entries of every level."""
 
 
 @device_function

@@ -1,4 +1,4 @@
-"""How plates and gates go down: at their speed, and never into the ball.
+"""How slabs go down: at their speed, and never into the ball.
 
 The original moves them through whatever is there. Here a slab that comes down on the ball stops on
 it, without pressing, and goes on when the ball is gone. That is decided from where both are when a
@@ -34,6 +34,7 @@ def lowering(
     movers: Movers,
     body: Float64,
     at: Columns,
+    speed: float,
 ) -> float:
     """Return the velocity at which a slab that goes down is pulled in the next step, m/s.
 
@@ -42,7 +43,7 @@ def lowering(
     """
     half, centre = movers.half[level, mover], movers.centre[level, mover]
     slab = body[at.displacement + mover]
-    down: float = movers.speed[level, mover]
+    down = speed
     now, soon = _room_under(
         duration_s,
         centre,

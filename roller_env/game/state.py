@@ -29,7 +29,7 @@ class GameState(NamedTuple):
         steps: (N,) control steps since the episode began.
         control_delay_s: (N,) time until the keys work (the intro).
         touching: (N, R) which regions the ball was in at the end of the last step.
-        signals: (N, G) which gates have been told to open.
+        signals: (N, S) which gates, platforms and fans have been told to go on.
         finished: (N,) the ball has reached the finish and is frozen.
         fallen: (N,) the ball has fallen below the kill height.
         diverged: (N,) the physics failed.
@@ -66,7 +66,7 @@ class GameState(NamedTuple):
             steps=np.zeros(num_envs, dtype=np.int64),
             control_delay_s=np.zeros(num_envs),
             touching=flags(table.regions.radius.shape[1]),
-            signals=flags(int(table.gate_count.max())),
+            signals=flags(table.signals),
             finished=flags(),
             fallen=flags(),
             diverged=flags(),

@@ -35,6 +35,8 @@ from roller_env.game.state import GameState
 from roller_env.game.tables import LevelTable, Movers, Regions, Routes
 from roller_env.physics.protocol import Columns
 from roller_env.pieces.coin import COIN, distance_to_next
+from roller_env.pieces.finish import FINISH
+from roller_env.pieces.hazard import HAZARD
 from roller_env.pieces.rules import WORK, After, Before, CameraAsked, Noticed, Seen, distance2
 from roller_env.pieces.sweep import bounds, meets, time_of_fall, vector, visit
 from roller_env.units import frames
@@ -52,7 +54,7 @@ HANGING_S: Final = SPLASH_S + frames(10.0)
 up. Until then nothing moves and nothing happens."""
 
 _COIN, _FINISH, _FALL, _PROGRESS = (REWARD_TERMS.index(name) for name in REWARD_TERMS)
-_COINS: Final = RULES.index(COIN)
+_COINS, _HAZARDS, _FINISHES = (RULES.index(rules) for rules in (COIN, HAZARD, FINISH))
 
 _act = all_hooks("act")
 _notice = all_hooks("notice")
@@ -119,9 +121,9 @@ class Preparing(NamedTuple):
         tables: of the kinds, by level.
         owns: (kinds, 5) their `Own`s.
         control_delay_s: (N,) of the state.
-        signals: (N, G) of the state.
+        signals: (N, S) of the state.
+        touching: (N, R) of the state.
         states: of the kinds, by env.
-        moving: (N, M) written: which slabs go down.
         hanging_s: (N,) written: time from the step's beginning until the ball is physical, if it is
             not.
     """
@@ -132,8 +134,8 @@ class Preparing(NamedTuple):
     owns: Int64
     control_delay_s: Float64
     signals: Bool
+    touching: Bool
     states: tuple[Any, ...]
-    moving: Bool
     hanging_s: Float64
 
 
@@ -152,7 +154,10 @@ class Concluding(NamedTuple):
         state: written.
         max_steps: (N,) control steps after which an episode is cut off.
         hanging_s: (N,) from `prepare`.
+        votes: (N, S) how many of the sources of each receiver are on.
         back_at: (N, 3) where a ball that has fallen is put.
+        thrown: (N, 1) whether a piece has put the ball elsewhere or thrown it.
+        motion: (N, 6) its place and velocity then.
         step: written.
     """
 
@@ -167,7 +172,10 @@ class Concluding(NamedTuple):
     state: GameState
     max_steps: Int64
     hanging_s: Float64
+    votes: Int64
     back_at: Float64
+    thrown: Bool
+    motion: Float64
     step: Step
 
 
@@ -211,7 +219,6 @@ class Games:
     def __init__(self, levels: LevelTable, level_of: Int64, max_steps: Int64):
         """Make games of ``levels``, each cut off after so many control steps, (N,)."""
         num_envs, regions = len(level_of), levels.regions.radius.shape[1]
-        movers = levels.movers.stop.shape[1]
         state = GameState.initial(levels, num_envs)
         state.truncated[:] = True
 
@@ -238,8 +245,8 @@ class Games:
             levels.owns,
             state.control_delay_s,
             state.signals,
+            state.touching,
             state.kinds,
-            flags(movers),
             self.hanging_s,
         )
         self.concluding = Concluding(
@@ -254,7 +261,10 @@ class Games:
             state,
             max_steps,
             self.hanging_s,
+            np.zeros((num_envs, levels.signals), dtype=np.int64),
             np.zeros((num_envs, 3)),
+            flags(1),
+            np.zeros((num_envs, 6)),
             self.step,
         )
         self.showing = Showing(
@@ -297,20 +307,30 @@ def prepare(
         # Both delays begin when the level is loaded.
         games.hanging_s[env] = max(delay_s - (INTRO_S - HANGING_S), 0.0)
         held = min(max(1.0 - delay_s / duration_s, 0.0), 1.0)
-        body, moving = physics[env], games.moving[env]
+        body = physics[env]
         force_n = body[at.force_n : at.force_n + 3]
         force_n[0] = key_force_n[env, 0] * held
         force_n[1] = key_force_n[env, 1] * held
         force_n[2] = 0.0
-        for mover in range(len(moving)):
-            moving[mover] = False
-        now = Before(level, env, duration_s, games.signals[env], force_n, moving)
+        pull = body[at.pull : at.pull + at.movers]
+        for mover in range(at.movers):
+            pull[mover] = 0.0
+        now = Before(
+            level,
+            env,
+            duration_s,
+            max(duration_s - games.hanging_s[env], 0.0),
+            games.signals[env],
+            games.touching[env],
+            body[at.aim : at.aim + at.movers],
+            force_n,
+            pull,
+        )
         _act(now, games.tables, games.states, games.owns)
-        for mover in range(len(moving)):
-            velocity = 0.0
-            if moving[mover]:
-                velocity = lowering(duration_s, level, mover, games.movers, body, at)
-            body[at.pull + mover] = velocity
+        for mover in range(at.movers):
+            if pull[mover] < 0.0 and games.movers.along[level, mover, 2] == 1.0:
+                speed = -pull[mover]
+                pull[mover] = lowering(duration_s, level, mover, games.movers, body, at, speed)
 
 
 @kernel
@@ -353,8 +373,14 @@ def conclude(
         step.camera.trigger[env] = -1
         step.camera.overhead[env] = False
         step.camera.behind[env] = returns
+        motion = games.motion[env]
+        games.thrown[env, 0] = False
         for axis in range(3):
             games.back_at[env, axis] = games.start[level, axis]
+            motion[axis] = physics[env, at.position + axis]
+            motion[3 + axis] = physics[env, at.velocity + axis]
+        for signal in range(games.votes.shape[1]):
+            games.votes[env, signal] = 0
         now = After(
             level,
             env,
@@ -365,20 +391,30 @@ def conclude(
             step.inside[env],
             physics[env, at.displacement : at.displacement + at.movers],
             step.coins[env],
+            games.votes[env],
             state.signals[env],
             step.camera,
             returns,
             games.back_at[env],
+            games.thrown[env],
+            motion[:3],
+            motion[3:],
         )
         _react(now, games.tables, state.kinds, games.owns)
         settle(env, duration_s, way[-1, 0], step.camera, state.camera)
+        over = state.finished[env] or state.fallen[env] or state.diverged[env]
+        thrown = games.thrown[env, 0] and not over and not returns
         for region in range(state.touching.shape[1]):
             state.touching[env, region] = step.inside[env, region] and not returns
-        over = state.finished[env] or state.fallen[env] or state.diverged[env]
         state.truncated[env] = not over and state.steps[env] >= games.max_steps[env]
         if returns:
             _put_back(physics[env], at, games.back_at[env])
             _pay(games, level, env, games.back_at[env], over, rewarding)
+        elif thrown:
+            for axis in range(3):
+                physics[env, at.position + axis] = motion[axis]
+                physics[env, at.velocity + axis] = motion[3 + axis]
+            _pay(games, level, env, motion[:3], over, rewarding)
         else:
             _pay(games, level, env, way[-1], over, rewarding)
 
@@ -396,7 +432,8 @@ def _find_events(games: Concluding, level: int, env: int, duration_s: float, pat
         step.end[env] = -np.inf
         step.fell[env] = False
         return
-    _notice(Noticed(level, env, live), games.tables, state.kinds, games.owns)
+    coins = state.kinds[_COINS].collected[env]
+    _notice(Noticed(level, env, coins, live), games.tables, state.kinds, games.owns)
     low, high = bounds(path)
     for region in range(len(entry)):
         centre, half = vector(regions.centre[level, region]), vector(regions.half[level, region])
@@ -405,9 +442,12 @@ def _find_events(games: Concluding, level: int, env: int, duration_s: float, pat
             floor, touching = regions.floor[level, region], state.touching[env, region]
             entry[region], inside[region] = visit(path, centre, half, radius, floor, touching)
     finish, fall = np.inf, time_of_fall(path, games.kill_height[level])
-    first, count = games.owns[-1, 0], games.owns[-1, 1]
+    first, count = games.owns[_FINISHES, 0], games.owns[_FINISHES, 1]
     for region in range(first, first + count):
         finish = min(finish, entry[region])
+    first, count = games.owns[_HAZARDS, 0], games.owns[_HAZARDS, 1]
+    for region in range(first, first + count):
+        fall = min(fall, entry[region])
     end = min(finish, fall)
     step.end[env] = end
     state.finished[env] |= finish < np.inf and finish <= fall
@@ -478,7 +518,9 @@ def _measure(
         coins = games.state.kinds[_COINS]
         distance = distance_to_next(games.tables[_COINS], coins, level, env, ball)
         if distance == np.inf:
-            distance = np.sqrt(distance2(games.regions.centre[level, games.owns[-1, 0]], ball))
+            distance = np.sqrt(
+                distance2(games.regions.centre[level, games.owns[_FINISHES, 0]], ball)
+            )
         progress = nearness(distance)
     shaping_of.potential[env] = rewarding.weights[_PROGRESS] * progress
 
@@ -533,8 +575,10 @@ def observe(games: Showing, physics: Float64, at: Columns, envs: Int64, out: Flo
             env,
             ball,
             games.regions.centre[level],
+            games.regions.half[level],
             games.regions.real[level],
             games.movers.centre[level],
+            games.movers.along[level],
             games.movers.stop[level],
             body[at.displacement : at.displacement + at.movers],
             games.work[env],

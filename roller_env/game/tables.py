@@ -6,7 +6,7 @@ them packed, padded to equal sizes. Padding never acts: a padded region lies inf
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import accumulate
 from typing import Any, NamedTuple
 
@@ -14,11 +14,12 @@ import numpy as np
 
 from roller_env.arrays import Bool, Float64, Int64
 from roller_env.game.kinds import RULES
-from roller_env.game.observations import STATE_ENTRIES, layout
+from roller_env.game.observations import Kinds, entries, layout
 from roller_env.level.expand import expand
 from roller_env.level.schema import PIECE_KINDS, Level
 from roller_env.pieces.piece import ExpandedLevel, Mover, Piece, Region
-from roller_env.pieces.rules import FAR_M, Own, Rules, TableT, padded
+from roller_env.pieces.rules import FAR_M, HIDDEN, Own, Rules, TableT, padded
+from roller_env.pieces.signals import first_signals
 
 
 class Regions(NamedTuple):
@@ -36,13 +37,13 @@ class Regions(NamedTuple):
 
 
 class Movers(NamedTuple):
-    """The slabs that go down, M of them in each of L levels."""
+    """The slabs that move along lines, M of them in each of L levels."""
 
     centre: Float64  # (L, M, 3) at the start, metres, world frame
     half: Float64  # (L, M, 3) half edges
     heading: Float64  # (L, M, 2) cosine and sine of the yaw
+    along: Float64  # (L, M, 3) direction in which its displacement counts
     stop: Float64  # (L, M) displacement at which it has arrived, <= 0; 0 for padding
-    speed: Float64  # (L, M) m/s, downwards
     ball_radius: Float64  # (L,) of the ball that they must not press
 
 
@@ -65,14 +66,14 @@ class LevelTable(NamedTuple):
     regions: Regions
     movers: Movers
     routes: Routes
-    gate_count: Int64  # (L,)
+    signals: int  # how many pieces can be told something, S
     kill_height: Float64  # (L,)
     comes_back: Bool  # (L,) whether a fall does not end the game
     time_limit_s: Float64  # (L,)
     start: Float64  # (L, 3)
     jitter: Float64  # (L, 2)
     kinds: tuple[Any, ...]
-    owns: Int64  # (kinds, 5)
+    owns: Int64  # (kinds, 6)
 
     @property
     def ball_radius(self) -> Float64:
@@ -80,8 +81,13 @@ class LevelTable(NamedTuple):
         return self.movers.ball_radius
 
     @staticmethod
-    def of_levels(levels: Sequence[Level]) -> LevelTable:
-        """Return the table of ``levels``, which `roller_env.level.load_level` has accepted."""
+    def of_levels(levels: Sequence[Level], shown: Kinds = "level") -> LevelTable:
+        """Return the table of ``levels``, which `roller_env.level.load_level` has accepted.
+
+        Args:
+            levels: the levels.
+            shown: whose entries an observation has; see `roller_env.game.observations`.
+        """
         if not levels:
             raise ValueError("levels: found none; at least one is needed")
         expanded = [expand(level) for level in levels]
@@ -89,7 +95,7 @@ class LevelTable(NamedTuple):
         regions = [[_regions(level, kind) for level in expanded] for kind in kinds]
         movers = [[_movers(level, kind) for level in expanded] for kind in kinds]
         region = _side_by_side(regions, [FAR_M] * 3 + [0.0] * 4 + [-np.inf])
-        mover = _side_by_side(movers, [0.0] * 10)
+        mover = _side_by_side(movers, [0.0] * 12)
         routes = [
             np.array(level.route.points) if level.route else np.zeros((0, 3)) for level in levels
         ]
@@ -105,8 +111,8 @@ class LevelTable(NamedTuple):
                 centre=np.ascontiguousarray(mover[..., :3]),
                 half=np.ascontiguousarray(mover[..., 3:6]),
                 heading=np.ascontiguousarray(mover[..., 6:8]),
-                stop=np.ascontiguousarray(mover[..., 8]),
-                speed=np.ascontiguousarray(mover[..., 9]),
+                along=np.ascontiguousarray(mover[..., 8:11]),
+                stop=np.ascontiguousarray(mover[..., 11]),
                 ball_radius=np.array([level.ball.radius for level in levels]),
             ),
             routes=Routes(
@@ -115,14 +121,19 @@ class LevelTable(NamedTuple):
                 radius=np.array([level.route.radius if level.route else 0.0 for level in levels]),
                 length=np.array([len(route) for route in routes]),
             ),
-            gate_count=np.array([len(level.gates) for level in levels]),
+            signals=first_signals(expanded)[Piece],
             kill_height=np.array([level.kill_height for level in levels]),
             comes_back=np.array([level.falls == "checkpoint" for level in levels]),
             time_limit_s=np.array([level.time_limit_s for level in levels]),
             start=np.array([level.start.at for level in levels]),
             jitter=np.array([level.start.jitter for level in levels]),
             kinds=tuple(rules.table(expanded) for rules in RULES),
-            owns=_owns(_widths(regions), _widths(movers)),
+            owns=_owns(
+                expanded,
+                _widths(regions),
+                _widths(movers),
+                layout(entries("state", shown, expanded)),
+            ),
         )
 
     def slots(self, levels: Sequence[Level]) -> list[list[int]]:
@@ -163,8 +174,7 @@ def _movers(level: ExpandedLevel, kind: type[Piece]) -> list[list[float]]:
 def _mover_row(mover: Mover) -> list[float]:
     solid = mover.solid
     heading = (solid.rotation[0][0], solid.rotation[1][0])
-    travel = mover.stop - solid.centre[2]
-    return [*solid.centre, *solid.half_size, *heading, travel, mover.speed]
+    return [*solid.centre, *solid.half_size, *heading, *mover.along, mover.stop]
 
 
 def _widths(kinds: Sequence[Sequence[Sequence[Any]]]) -> list[int]:
@@ -183,11 +193,20 @@ def _side_by_side(kinds: Sequence[Sequence[Sequence[Any]]], padding: Sequence[fl
     return result
 
 
-def _owns(regions: Sequence[int], movers: Sequence[int]) -> Int64:
-    entries = layout(STATE_ENTRIES)
-    first = [entries[rules.entries[0].name].start if rules.entries else 0 for rules in RULES]
+def _owns(
+    levels: Sequence[ExpandedLevel],
+    regions: Sequence[int],
+    movers: Sequence[int],
+    entries: Mapping[str, slice],
+) -> Int64:
+    first, told = [], first_signals(levels)
+    signal = {kind.rules: number for kind, number in told.items()}
+    for rules in RULES:
+        shown = entries.get(rules.entries[0].name) if rules.entries else None
+        first.append(HIDDEN if shown is None else shown.start)
     region, mover = accumulate(regions, initial=0), accumulate(movers, initial=0)
-    return np.array(list(zip(region, regions, mover, movers, first, strict=False)))
+    signals = [signal.get(rules, 0) for rules in RULES]
+    return np.array(list(zip(region, regions, mover, movers, first, signals, strict=False)))
 
 
 def _arcs(route: Float64) -> Float64:

@@ -57,6 +57,8 @@ def surroundings(level: Level, in_unit: InUnit, solids: Sequence[Solid]) -> Surr
     """Return what a piece may know of its level, in which ``solids`` stand still."""
     return Surroundings(
         pieces=[piece for _, piece in level.pieces()],
+        start=level.start.at,
+        jitter=level.start.jitter,
         solids=solids,
         ball_radius=level.ball.radius,
         weight_n=level.ball.mass_kg * level.gravity,

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -181,16 +181,11 @@ def _flood(level: Level, play: Play, coins: Float64, struck: Bool) -> _Found | N
 def _solids(level: Level, struck: Bool) -> list[Solid]:
     """Return what is solid, with the plates that were struck down and their gates open."""
     plates = [level.plates[index] for index in np.flatnonzero(struck)]
-    down = {name for plate in plates for name in (plate.name, *plate.sets_moving())}
+    down = {name for plate in plates for name in (plate.name, *plate.signals())}
     everything = expand(level)
     return [
         *everything.solids,
-        *(
-            replace(mover.solid, centre=(*mover.solid.centre[:2], mover.stop))
-            if mover.name in down
-            else mover.solid
-            for mover in everything.movers
-        ),
+        *(mover.end if mover.name in down else mover.solid for mover in everything.movers),
     ]
 
 

@@ -18,9 +18,11 @@ from pydantic import Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from roller_env.pieces.box import Box
+from roller_env.pieces.bumper import Bumper
 from roller_env.pieces.camera_trigger import CameraTrigger
 from roller_env.pieces.checkpoint import Checkpoint
 from roller_env.pieces.coin import Coins
+from roller_env.pieces.fan import Fan
 from roller_env.pieces.fields import (
     METRES_PER_UNIT,
     Colour,
@@ -38,10 +40,15 @@ from roller_env.pieces.finish import Finish
 from roller_env.pieces.floor import FloorPlan
 from roller_env.pieces.gate import Gate
 from roller_env.pieces.ground import Ground
+from roller_env.pieces.hazard import Hazard
 from roller_env.pieces.lift_pad import LiftPad
 from roller_env.pieces.piece import Piece, Solid
 from roller_env.pieces.plate import Plate
+from roller_env.pieces.platform import Platform
 from roller_env.pieces.ramp import Ramp
+from roller_env.pieces.spring import Spring
+from roller_env.pieces.switch import Switch
+from roller_env.pieces.teleporter import Teleporter
 from roller_env.pieces.tube import Tube
 from roller_env.pieces.wall import Wall
 from roller_env.units import quants
@@ -147,8 +154,15 @@ class Level(Part):
     walls: tuple[Wall, ...] = ()
     tubes: tuple[Tube, ...] = ()
     plates: tuple[Plate, ...] = ()
+    switches: tuple[Switch, ...] = ()
     gates: tuple[Gate, ...] = ()
+    platforms: tuple[Platform, ...] = ()
+    fans: tuple[Fan, ...] = ()
     lift_pads: tuple[LiftPad, ...] = ()
+    springs: tuple[Spring, ...] = ()
+    bumpers: tuple[Bumper, ...] = ()
+    teleporters: tuple[Teleporter, ...] = ()
+    hazards: tuple[Hazard, ...] = ()
     camera_triggers: tuple[CameraTrigger, ...] = ()
     checkpoints: tuple[Checkpoint, ...] = ()
     route: Route | None = None

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Annotated, Final, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
+from roller_env.arrays import Int64
 from roller_env.pieces.fields import Point, Size
 from roller_env.pieces.look import Fly, Paint, Shape, part
-from roller_env.pieces.piece import UNTURNED, Piece, Region, Solid, Vector, half_of
-from roller_env.pieces.rules import Own, Rules, Seen, no_state, no_table, place_entry, show_place
+from roller_env.pieces.piece import UNTURNED, ExpandedLevel, Piece, Region, Solid, Vector, half_of
+from roller_env.pieces.rules import Noticed, Own, Rules, Seen, no_state, place_entry, show_place
 from roller_env.pieces.space import burying
 from roller_env.pieces.surfaces import box_surfaces
 from roller_env.problems import FieldPath, Problem
@@ -44,13 +45,20 @@ class Finish(Piece):
 
     at: Point = Field(description="Its centre.")
     size: Size = Field(description="Full edge lengths.")
+    needs_coins: Annotated[int, Field(ge=0, strict=True)] = Field(
+        0, description="How many coins have to be collected before it is open."
+    )
 
     def region(self, touch: float) -> Region:
         """Return where the ball touches it."""
         return Region(self.at, half_of(self.size), touch)
 
     def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
-        """Yield that it is too low, or wholly hidden."""
+        """Yield that it is too low, wholly hidden, or never open."""
+        coins = sum(piece.count().coins for piece in around.pieces)
+        if self.needs_coins > coins:
+            found = f"found {self.needs_coins}, and the level has {coins} coins"
+            yield Problem((*path, "needs_coins"), f"{found}; wanted at most as many")
         yield from around.too_low((*path, "at"), "the finish is", self.at[2])
         hiding = burying(around.solids, self.at, self.size, around.ball_radius)
         if hiding:
@@ -88,15 +96,38 @@ class Finish(Piece):
 # Rules: that it ends the game is said in `roller_env.game.step` -----------------------------------
 
 
-def _show(now: Seen, table: None, state: None, own: Own) -> None:
+class FinishTable(NamedTuple):
+    """Numbers of the finish.
+
+    Attributes:
+        coins: (L,) how many have to be collected before it is open.
+    """
+
+    coins: Int64
+
+
+def _table(levels: Sequence[ExpandedLevel]) -> FinishTable:
+    return FinishTable(
+        np.array([level.of(Finish)[0].needs_coins for level in levels], dtype=np.int64)
+    )
+
+
+def _notice(now: Noticed, table: FinishTable, state: None, own: Own) -> None:
+    for region in range(own.region, own.region + own.regions):
+        now.live[region] &= now.coins >= table.coins[now.level]
+
+
+def _show(now: Seen, table: FinishTable, state: None, own: Own) -> None:
     show_place(now.out, own.entry, now.centre[own.region], now.ball)
 
 
 FINISH: Final = Rules(
     name="finish",
-    table=no_table,
+    table=_table,
     state=no_state,
+    is_basic=True,
     entries=(place_entry("finish", "centre of the finish"),),
+    notice=_notice,
     show=_show,
 )
 Finish.rules = FINISH

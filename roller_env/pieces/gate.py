@@ -1,28 +1,39 @@
-"""A gate that plates open."""
+"""A gate that plates and switches open."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
+from roller_env.arrays import Bool, Float64, Int64
 from roller_env.pieces.fields import Degrees, Length, Name, Point, PositiveLength, Size
 from roller_env.pieces.ground import Ground, settled
 from roller_env.pieces.look import ACTIVE, DONE, IDLE, Shape, part, states
-from roller_env.pieces.piece import Mover, Piece, Solid, Vector, half_of, rotation_matrix
+from roller_env.pieces.piece import (
+    ExpandedLevel,
+    Mover,
+    Piece,
+    Solid,
+    Vector,
+    half_of,
+    rotation_matrix,
+)
 from roller_env.pieces.rules import (
+    After,
     Before,
     Own,
     Rules,
     Seen,
     fraction_entry,
     no_state,
-    no_table,
+    padded,
     place_entry,
 )
+from roller_env.pieces.signals import Needs, needed_by
 from roller_env.pieces.spans import EDGE, free_spans
 from roller_env.problems import FieldPath, Problem, quoted
 from roller_env.units import quants
@@ -38,9 +49,11 @@ _PAINT: Final = states("gate", ("#ff4d4d", 0.5), ("#ffb02e", 0.7), ("#35c46f", 0
 
 
 class Gate(Piece):
-    """A slab that sinks out of the way when one of its plates is down."""
+    """A slab that sinks out of the way when one of its plates is down, or switches on."""
 
-    name: Name = Field(description="For `opens` of its plates; no two pieces share one.")
+    receives: ClassVar[bool] = True
+
+    name: Name = Field(description="For its plates and switches; no two pieces share one.")
     at: Point = Field(description="Its centre while it is closed.")
     size: Size = Field(description="Full edge lengths.")
     yaw_deg: Degrees = Field(0.0, description="Positive turns it to the left, as a box.")
@@ -49,7 +62,14 @@ class Gate(Piece):
         description="Height of its centre when it is open. If left out, its upper face is then "
         "level with that of what it stands on; if it stands on nothing, -32 quants.",
     )
-    speed: PositiveLength = Field(quants(32.0), description="Length per second, downwards.")
+    speed: PositiveLength = Field(quants(32.0), description="Length per second.")
+    needs: Needs = Field(
+        "any", description="Whether one of its plates and switches opens it, or only `all` of them."
+    )
+    closes: bool = Field(
+        False,
+        description="Whether it goes up again when what opened it is off, as switches can be.",
+    )
 
     def settled(self, ground: Ground) -> Gate:
         """Return it with the height at which it is open."""
@@ -59,7 +79,7 @@ class Gate(Piece):
     def mover(self, source: str) -> Mover:
         """Return the gate, which a `Level` has settled."""
         assert self.lowers_to is not None, "a Level settles it when it is built"
-        return Mover(self.name, self._solid(source), self.lowers_to, self.speed)
+        return Mover.down(self.name, self._solid(source), self.lowers_to, self.speed)
 
     def _solid(self, source: str) -> Solid:
         return Solid(self.at, half_of(self.size), rotation_matrix(self.yaw_deg), "", source)
@@ -87,8 +107,11 @@ class Gate(Piece):
 
     def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
         """Yield that nothing opens it, and why it cannot go down."""
-        if self.name not in around.set_moving:
-            message = f"no plate opens the gate {quoted(self.name)}; name it in a plate's 'opens'"
+        if self.name not in around.told:
+            message = (
+                f"nothing opens the gate {quoted(self.name)}; name it in a plate's 'opens' or a "
+                "switch's 'sets'"
+            )
             yield Problem((*path, "name"), message)
         yield from around.rises(self, (*path, "lowers_to"), self.mover(""))
 
@@ -113,7 +136,7 @@ class Gate(Piece):
             return
         # The ground on which most of it stands out.
         level_of_it = float(np.median(ground[in_the_way]))
-        stop = self.mover("").stop
+        stop = self.mover("").end.centre[2]
         left = stop + half - level_of_it
         if left < radius or stop - half > level_of_it + 2 * radius:
             return
@@ -129,12 +152,48 @@ class Gate(Piece):
 # Rules --------------------------------------------------------------------------------------------
 
 
-def _act(now: Before, table: None, state: None, own: Own) -> None:
+class GateTable(NamedTuple):
+    """Numbers of G gates.
+
+    Attributes:
+        speed: (L, G) m/s.
+        needed: (L, G) how many votes open each.
+        closes: (L, G) whether it closes again.
+    """
+
+    speed: Float64
+    needed: Int64
+    closes: Bool
+
+
+def _table(levels: Sequence[ExpandedLevel]) -> GateTable:
+    gates = [level.of(Gate) for level in levels]
+    return GateTable(
+        speed=padded([[gate.speed for gate in row] for row in gates]),
+        needed=needed_by(Gate, levels),
+        closes=padded([[gate.closes for gate in row] for row in gates]) > 0.0,
+    )
+
+
+def _act(now: Before, table: GateTable, state: None, own: Own) -> None:
     for gate in range(own.movers):
-        now.moving[own.mover + gate] = now.signals[gate]
+        speed = table.speed[now.level, gate]
+        if now.signals[own.signal + gate]:
+            now.pull[own.mover + gate] = -speed
+        elif table.closes[now.level, gate] and now.aim[own.mover + gate] < 0.0:
+            now.pull[own.mover + gate] = speed
 
 
-def _show(now: Seen, table: None, state: None, own: Own) -> None:
+def _react(now: After, table: GateTable, state: None, own: Own) -> None:
+    """Count the votes."""
+    for gate in range(own.movers):
+        signal = own.signal + gate
+        told = now.votes[signal] >= table.needed[now.level, gate]
+        stays = now.signals[signal] and not table.closes[now.level, gate]
+        now.signals[signal] = told or stays
+
+
+def _show(now: Seen, table: GateTable, state: None, own: Own) -> None:
     """Write the nearest gate not yet open, where it is now, and how far it has gone."""
     best2 = np.inf
     for gate in range(own.mover, own.mover + own.movers):
@@ -155,14 +214,16 @@ def _show(now: Seen, table: None, state: None, own: Own) -> None:
 
 GATE: Final = Rules(
     name="gate",
-    table=no_table,
+    table=_table,
     state=no_state,
+    is_basic=True,
     entries=(
         place_entry("gate", "centre of the nearest gate not yet open; 0 if none"),
         fraction_entry("gate_present", "1 where `gate` shows a gate"),
         fraction_entry("gate_lowered", "share of its way down that this gate has gone"),
     ),
     act=_act,
+    react=_react,
     show=_show,
 )
 Gate.rules = GATE

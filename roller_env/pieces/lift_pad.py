@@ -216,6 +216,7 @@ LIFT_PAD: Final = Rules(
     name="lift_pad",
     table=_table,
     state=_state,
+    is_basic=True,
     entries=(
         place_entry("pad", "centre of the nearest lift pad; 0 if none"),
         fraction_entry("pad_present", "1 where `pad` shows a pad"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self, TypeVar, cast
 
 import numpy as np
@@ -27,6 +27,8 @@ Vector = tuple[float, float, float]
 TOUCHING_M: Final = 0.001
 """Things that are this near to each other touch, and one may reach this deep into another: covers
 rounded numbers in files and the depth to which a resting ball sinks into MuJoCo's soft contacts."""
+
+UPWARDS: Final[Vector] = (0.0, 0.0, 1.0)
 
 UNTURNED: Final[Matrix] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -68,28 +70,46 @@ class Solid:
 
 @dataclass(frozen=True, slots=True)
 class Mover:
-    """A solid slab that goes down along a line and stops there.
+    """A solid slab that moves along a line between where it is at the start and an end.
 
     Attributes:
         name: of the piece.
         solid: where it is at the start.
-        stop: height at which its centre has arrived, metres.
-        speed: m/s, downwards.
+        stop: displacement at which it has arrived, metres, <= 0.
+        travel: displacement at which it stands still, metres, <= ``stop``.
+        speed: m/s, at most.
+        along: unit vector in which displacements count, world frame: away from the end.
     """
 
     name: str
     solid: Solid
     stop: float
+    travel: float
     speed: float
+    along: Vector = UPWARDS
+
+    @staticmethod
+    def down(name: str, solid: Solid, to: float, speed: float) -> Mover:
+        """Return a slab that goes down until its centre is at a height, as the original's do.
+
+        That tests ``z > stop`` before each decrement, so its slabs end up to one frame of travel
+        below the stop: here half a frame, on average the same, and so they do pass it.
+        """
+        height = solid.centre[2]
+        return Mover(name, solid, to - height, to - 0.5 * speed / SCRIPT_RATE_HZ - height, speed)
 
     @property
-    def travel(self) -> float:
-        """Displacement at which it stands still, metres, <= 0.
+    def end(self) -> Solid:
+        """It where it has arrived."""
+        return self.at(self.stop)
 
-        The original tests ``z > stop`` before each decrement, so its slabs end up to one frame of
-        travel below the stop: here half a frame, on average the same, and so they do pass it.
-        """
-        return self.stop - 0.5 * self.speed / SCRIPT_RATE_HZ - self.solid.centre[2]
+    def at(self, displacement: float) -> Solid:
+        """Return it where it is then."""
+        x, y, z = (
+            here + displacement * way
+            for here, way in zip(self.solid.centre, self.along, strict=True)
+        )
+        return replace(self.solid, centre=(x, y, z))
 
 
 class Region(NamedTuple):
@@ -121,11 +141,13 @@ class Piece(Part):
     What a kind does not have it leaves as it is here: nothing.
 
     Attributes:
+        receives: whether plates and switches can tell it something, by its name.
         is_pipe: whether its solids are pipes, not decks: it says itself how they look, and a map
             may be cut through them.
         rules: what the kind does in a game; None for what is only solid.
     """
 
+    receives: ClassVar[bool] = False
     is_pipe: ClassVar[bool] = False
     rules: ClassVar[Rules[Any, Any] | None] = None
 
@@ -167,8 +189,8 @@ class Piece(Part):
         """
         return None
 
-    def sets_moving(self) -> tuple[str, ...]:
-        """Return the names of the pieces that begin to move when it has done so."""
+    def signals(self) -> tuple[str, ...]:
+        """Return the names of the pieces that it tells when it is down, or on."""
         return ()
 
     def looks(self, number: int) -> Iterator[Shape]:
@@ -277,13 +299,20 @@ def number_of(source: str) -> int:
     return int(number[0]) if number else 0
 
 
-def rotation_matrix(yaw_deg: float = 0.0, pitch_deg: float = 0.0) -> Matrix:
-    """Return the matrix of a pitch about y followed by a yaw about z, box to world frame."""
-    if yaw_deg == 0.0 and pitch_deg == 0.0:
+def rotation_matrix(yaw_deg: float = 0.0, pitch_deg: float = 0.0, roll_deg: float = 0.0) -> Matrix:
+    """Return the matrix of a roll about x, then a pitch about y, then a yaw about z."""
+    if yaw_deg == 0.0 and pitch_deg == 0.0 and roll_deg == 0.0:
         return UNTURNED
-    yaw, pitch = math.radians(yaw_deg), math.radians(pitch_deg)
+    yaw, pitch, roll = math.radians(yaw_deg), math.radians(pitch_deg), math.radians(roll_deg)
     cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
-    return ((cy * cp, -sy, cy * sp), (sy * cp, cy, sy * sp), (-sp, 0.0, cp))
+    if roll_deg == 0.0:
+        return ((cy * cp, -sy, cy * sp), (sy * cp, cy, sy * sp), (-sp, 0.0, cp))
+    cr, sr = math.cos(roll), math.sin(roll)
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
 
 
 def half_of(size: Vector) -> Vector:

@@ -10,7 +10,6 @@ from pydantic import Field
 
 from roller_env.arrays import Bool, Float64
 from roller_env.pieces.fields import Length, Name, Point, PositiveLength, Size
-from roller_env.pieces.gate import Gate
 from roller_env.pieces.ground import Ground, settled
 from roller_env.pieces.look import ACTIVE, DONE, IDLE, Shape, part, states
 from roller_env.pieces.piece import (
@@ -37,8 +36,9 @@ from roller_env.pieces.rules import (
     place_entry,
     show_place,
 )
+from roller_env.pieces.signals import unknown_receivers, votes_of
 from roller_env.pieces.space import burying
-from roller_env.problems import FieldPath, Problem, listed, quoted
+from roller_env.problems import FieldPath, Problem
 from roller_env.units import quants
 
 if TYPE_CHECKING:
@@ -67,7 +67,9 @@ class Plate(Piece):
     name: Name = Field(description="No two pieces share one.")
     at: Point = Field(description="Its centre before it sinks.")
     size: Size = Field(description="Full edge lengths.")
-    opens: tuple[str, ...] = Field(description="The names of its gates, at least one.")
+    opens: tuple[str, ...] = Field(
+        description="The names of its gates, or of platforms and fans that it starts; at least one."
+    )
     sinks_to: Length | None = Field(
         None,
         description="Height of its centre when it is down. If left out, 13 quants under the upper "
@@ -82,7 +84,7 @@ class Plate(Piece):
     def mover(self, source: str) -> Mover:
         """Return the plate, which a `Level` has settled."""
         assert self.sinks_to is not None, "a Level settles it when it is built"
-        return Mover(self.name, self._solid(source), self.sinks_to, self.speed)
+        return Mover.down(self.name, self._solid(source), self.sinks_to, self.speed)
 
     def _solid(self, source: str) -> Solid:
         return Solid(self.at, half_of(self.size), UNTURNED, "", source)
@@ -108,13 +110,13 @@ class Plate(Piece):
         """Return its name."""
         return self.name, self.at
 
-    def sets_moving(self) -> tuple[str, ...]:
-        """Return its gates."""
+    def signals(self) -> tuple[str, ...]:
+        """Return its gates, and whatever else it sets going."""
         return self.opens
 
     def problems(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
         """Yield gates that are not there, and why it cannot be struck or go down."""
-        yield from self._links(path, around.names.get(Gate, ()))
+        yield from unknown_receivers((*path, "opens"), "plate", self.opens, around.receivers())
         radius, length = around.ball_radius, around.in_unit.length
         struck_at = radius + self.size[2] / 2
         if struck_at < PLATE_HIT_HEIGHT_M + TOUCHING_M:
@@ -126,17 +128,6 @@ class Plate(Piece):
                 f"wanted a plate at least {around.in_unit.rounded_up(least)} high",
             )
         yield from around.rises(self, (*path, "sinks_to"), self.mover(""))
-
-    def _links(self, path: FieldPath, gates: tuple[str, ...]) -> Iterator[Problem]:
-        none = "the level has no gates that a plate could open"
-        if not self.opens:
-            message = f"the plate opens nothing; name at least one gate of {listed(gates)}"
-            yield Problem((*path, "opens"), message if gates else none)
-        for number, name in enumerate(self.opens):
-            if name not in gates:
-                message = f"no gate is called {quoted(name)}; there are {listed(gates)}"
-                where = (*path, "opens", number)
-                yield Problem(where, message if gates else none, written=name, known=gates)
 
     def doubts(self, path: FieldPath, around: Surroundings) -> Iterator[Problem]:
         """Yield what wholly hides it."""
@@ -154,11 +145,13 @@ class PlateTable(NamedTuple):
 
     Attributes:
         stop: (L, P) displacement at which each is down, metres, <= 0.
-        opens: (L, P, G) which gates each opens.
+        speed: (L, P) m/s, downwards.
+        votes: (L, P, S) whom each tells to go on.
     """
 
     stop: Float64
-    opens: Bool
+    speed: Float64
+    votes: Bool
 
 
 class PlateState(NamedTuple):
@@ -174,19 +167,12 @@ class PlateState(NamedTuple):
 
 
 def _table(levels: Sequence[ExpandedLevel]) -> PlateTable:
-    gates = [[gate.name for gate in level.of(Gate)] for level in levels]
-    width = max(map(len, gates))
-    opens = [
-        [
-            [name in plate.opens for name in names] + [False] * (width - len(names))
-            for plate in level.of(Plate)
-        ]
-        for level, names in zip(levels, gates, strict=True)
-    ]
-    stops = [
-        [mover.stop - mover.solid.centre[2] for mover in level.movers_of(Plate)] for level in levels
-    ]
-    return PlateTable(stop=padded(stops), opens=padded(opens, (width,)) > 0.0)
+    movers = [level.movers_of(Plate) for level in levels]
+    return PlateTable(
+        stop=padded([[mover.stop for mover in row] for row in movers]),
+        speed=padded([[mover.speed for mover in row] for row in movers]),
+        votes=votes_of(Plate, levels),
+    )
 
 
 def _state(table: PlateTable, num_envs: int) -> PlateState:
@@ -196,7 +182,8 @@ def _state(table: PlateTable, num_envs: int) -> PlateState:
 
 def _act(now: Before, table: PlateTable, state: PlateState, own: Own) -> None:
     for plate in range(own.movers):
-        now.moving[own.mover + plate] = state.struck[now.env, plate]
+        if state.struck[now.env, plate]:
+            now.pull[own.mover + plate] = -table.speed[now.level, plate]
 
 
 def _notice(now: Noticed, table: PlateTable, state: PlateState, own: Own) -> None:
@@ -205,15 +192,15 @@ def _notice(now: Noticed, table: PlateTable, state: PlateState, own: Own) -> Non
 
 
 def _react(now: After, table: PlateTable, state: PlateState, own: Own) -> None:
-    """Start the plates that were struck, see which have arrived, and open their gates."""
+    """Start the plates that were struck, and give the votes of those that have arrived."""
     for plate in range(own.regions):
         state.struck[now.env, plate] |= now.entry[own.region + plate] < np.inf
         fallen = now.displacement[own.mover + plate] <= table.stop[now.level, plate]
         if state.struck[now.env, plate] and fallen:
             state.down[now.env, plate] = True
         if state.down[now.env, plate]:
-            for gate in range(len(now.signals)):
-                now.signals[gate] |= table.opens[now.level, plate, gate]
+            for signal in range(len(now.votes)):
+                now.votes[signal] += table.votes[now.level, plate, signal]
 
 
 def _show(now: Seen, table: PlateTable, state: PlateState, own: Own) -> None:
@@ -235,6 +222,7 @@ PLATE: Final = Rules(
     name="plate",
     table=_table,
     state=_state,
+    is_basic=True,
     entries=(
         place_entry("plate", "centre of the nearest plate not yet struck; 0 if none"),
         fraction_entry("plate_present", "1 where `plate` shows a plate"),

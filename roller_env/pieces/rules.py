@@ -23,6 +23,9 @@ from roller_env.pieces.piece import ExpandedLevel
 FAR_M: Final = 1e12
 """Where padding lies."""
 
+HIDDEN: Final = -1
+"""Entry of a kind that is not shown."""
+
 WORK: Final = 8
 """Numbers that a hook has to work with, since it makes no arrays."""
 
@@ -39,7 +42,8 @@ class Own(NamedTuple):
         regions: their number.
         mover: the first of its movers.
         movers: their number.
-        entry: the first of its numbers in an observation.
+        entry: the first of its numbers in an observation; `HIDDEN` if they are not shown.
+        signal: the first of its signals.
     """
 
     region: int
@@ -47,6 +51,7 @@ class Own(NamedTuple):
     mover: int
     movers: int
     entry: int
+    signal: int
 
 
 class Before(NamedTuple):
@@ -56,17 +61,23 @@ class Before(NamedTuple):
         level: row of the tables.
         env: row of the states.
         duration_s: of the step.
-        signals: (G,) which gates have been told to open.
+        moving_s: how much of it, at its end, things move: all, but in the intro.
+        signals: (S,) which receivers have been told to go on.
+        touching: (R,) which regions the ball is in.
+        aim: (M,) displacements to which the movers are being pulled, metres, <= 0.
         force_n: (3,) to add to: mean force on the ball over the step, newtons, world frame.
-        moving: (M,) to say: which movers go down.
+        pull: (M,) to set: velocity of each mover along its line, m/s; below 0 towards its end.
     """
 
     level: int
     env: int
     duration_s: float
+    moving_s: float
     signals: Bool
+    touching: Bool
+    aim: Float64
     force_n: Float64
-    moving: Bool
+    pull: Float64
 
 
 class CameraAsked(NamedTuple):
@@ -89,11 +100,13 @@ class Noticed(NamedTuple):
     Attributes:
         level: row of the tables.
         env: row of the states.
+        coins: how many are collected.
         live: (R,) to take back: which regions can do something if the ball enters them.
     """
 
     level: int
     env: int
+    coins: int
     live: Bool
 
 
@@ -111,10 +124,14 @@ class After(NamedTuple):
         inside: (R,) which regions it is in at the end.
         displacement: (M,) how far the movers are from where they began, metres, <= 0.
         coins: (1,) to add to: how many coins the step has earned.
-        signals: (G,) to set: which gates are told to open.
+        votes: (S,) to add to: how many of the sources of each receiver are on.
+        signals: (S,) to set: which receivers are told to go on.
         camera: what the pieces ask of it.
         returns: whether the ball has fallen and is put back at the end of the step.
         back_at: (3,) to set: where its centre is put then; the level's start so far. Metres.
+        thrown: (1,) to set: whether the ball's place or velocity is another one.
+        place: (3,) to set, with ``thrown``: the ball's centre, metres, world frame.
+        velocity: (3,) to set, with ``thrown``: m/s, world frame.
     """
 
     level: int
@@ -126,10 +143,14 @@ class After(NamedTuple):
     inside: Bool
     displacement: Float64
     coins: Int64
+    votes: Int64
     signals: Bool
     camera: CameraAsked
     returns: bool
     back_at: Float64
+    thrown: Bool
+    place: Float64
+    velocity: Float64
 
 
 class Seen(NamedTuple):
@@ -140,8 +161,10 @@ class Seen(NamedTuple):
         env: row of the states.
         ball: (3,) its centre, metres, world frame.
         centre: (R, 3) the regions' centres.
+        half: (R, 3) the half edges of their boxes.
         real: (R,) which regions there are; the others are padding.
         mover_centre: (M, 3) where the movers began, metres.
+        mover_along: (M, 3) directions in which their displacements count.
         mover_stop: (M,) displacement at which each has arrived, <= 0; 0 for padding.
         displacement: (M,) how far they are from there.
         work: (`WORK`,) numbers to work with; anything is in them.
@@ -152,8 +175,10 @@ class Seen(NamedTuple):
     env: int
     ball: Float64
     centre: Float64
+    half: Float64
     real: Bool
     mover_centre: Float64
+    mover_along: Float64
     mover_stop: Float64
     displacement: Float64
     work: Float64
@@ -215,7 +240,8 @@ class Rules(Generic[TableT, StateT]):
         state: makes, of a table and a number N, the state at the start of an episode: a NamedTuple
             of arrays (N, ...).
         entries: what an observation shows of it.
-        act: a hook with `Before`: adds forces on the ball, and says which of its movers go.
+        is_basic: whether it shows them in every level; otherwise only where there are such pieces.
+        act: a hook with `Before`: adds forces on the ball, and says how its movers go.
         notice: a hook with `Noticed`: says which of its regions can do something.
         react: a hook with `After`: draws the consequences of a step.
         show: a hook with `Seen`: writes its entries.
@@ -225,6 +251,7 @@ class Rules(Generic[TableT, StateT]):
     table: Callable[[Sequence[ExpandedLevel]], TableT]
     state: Callable[[TableT, int], StateT]
     entries: tuple[Entry, ...] = ()
+    is_basic: bool = False
     act: Hook = nothing
     notice: Hook = nothing
     react: Hook = nothing
@@ -248,6 +275,29 @@ def distance2(point: Float64, ball: Float64) -> float:
     x, y, z = point[0] - ball[0], point[1] - ball[1], point[2] - ball[2]
     squared: float = x * x + y * y + z * z
     return squared
+
+
+@device_function
+def nearest_in_box(centre: Float64, half: Float64, ball: Float64) -> tuple[float, float, float]:
+    """Return the place of a box that is nearest to the ball, as seen from the ball."""
+    x = min(max(ball[0], centre[0] - half[0]), centre[0] + half[0]) - ball[0]
+    y = min(max(ball[1], centre[1] - half[1]), centre[1] + half[1]) - ball[1]
+    z = min(max(ball[2], centre[2] - half[2]), centre[2] + half[2]) - ball[2]
+    return x, y, z
+
+
+@device_function
+def show_nearest(now: Seen, own: Own) -> int:
+    """Write the place of the nearest of a kind's regions, and 1; return which it is, -1 if none."""
+    best, best2 = -1, np.inf
+    for region in range(own.region, own.region + own.regions):
+        new2 = distance2(now.centre[region], now.ball)
+        if now.real[region] and new2 < best2:
+            best, best2 = region - own.region, new2
+    if best >= 0:
+        show_place(now.out, own.entry, now.centre[own.region + best], now.ball)
+        now.out[own.entry + 3] = 1.0
+    return best
 
 
 @device_function

@@ -40,7 +40,9 @@ class Autopilot:
     def __call__(self, simulation: Simulation) -> Any:
         """Return the action for the next control step."""
         if self._action is None or int(simulation.state.steps[0]) % self._steps_per_action == 0:
-            observation = shape_observation(simulation.config, simulation.observe())
+            observation = shape_observation(
+                simulation.config, simulation.entries, simulation.observe()
+            )
             self._action = self._policy(observation)[0]
         return self._action
 

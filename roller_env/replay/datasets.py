@@ -19,7 +19,7 @@ import gymnasium as gym
 
 from roller_env import ENV_IDS, __version__
 from roller_env.config import EnvConfig
-from roller_env.envs.spaces import action_space, observation_space
+from roller_env.envs.spaces import action_space, entries_of, observation_space
 from roller_env.level import load_level
 from roller_env.physics.presets import PRESETS
 from roller_env.replay.contents import Replay
@@ -88,7 +88,7 @@ def to_minari(
             buffer=episodes,
             env=environment_spec(config),
             action_space=action_space(config),
-            observation_space=observation_space(config),
+            observation_space=observation_space(config, entries_of(config)),
             algorithm_name=", ".join(players),
             author=author or None,
             description=f"{len(episodes)} episodes of Roller's level {first.level.name!r}.",

@@ -122,7 +122,7 @@ def _play(replays: list[Replay], changes: dict[str, Any]) -> list[Experience]:
     return [
         Experience(
             replay=replay,
-            observations=shape_observation(config, seen[begin : end + 1, row]),
+            observations=shape_observation(config, simulation.entries, seen[begin : end + 1, row]),
             actions=recorded_actions(config.action, replay.force_n[begin:]),
             rewards=reward[begin:end, row].copy(),
             terminated=terminated[begin:end, row].copy(),

@@ -29,6 +29,7 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from roller_env.checks import Refused, messages_of, nearest
 from roller_env.config import MAX_ENVS, EnvConfig, LevelSource
 from roller_env.envs.spaces import action_space, observation_space
+from roller_env.game.observations import entries
 from roller_env.problems import FieldPath, Problem, listed
 from roller_env.training.config_source import ConfigError, ConfigSource
 
@@ -258,9 +259,14 @@ class TrainingConfig(_Frozen):
 
     @model_validator(mode="after")
     def _the_agent_fits_into_its_evaluation(self) -> TrainingConfig:
-        for space in (observation_space, action_space):
-            if space(self.environment) != space(self.evaluation_environment):
-                name = space.__name__.replace("_space", "")
+        learnt, judged = self.environment, self.evaluation_environment
+        # Both are on the same level, which need not be there.
+        parts = [entries(each.observation, each.kinds) for each in (learnt, judged)]
+        seen = [observation_space(e, p) for e, p in zip((learnt, judged), parts, strict=True)]
+        others = {"observation": learnt.kinds != judged.kinds or seen[0] != seen[1]}
+        others["action"] = action_space(learnt) != action_space(judged)
+        for name, differ in others.items():
+            if differ:
                 message = (
                     "evaluation_environment: an agent can be judged only with the observations "
                     "and actions it was trained with; remove {name}, or train with it"

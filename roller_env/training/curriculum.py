@@ -312,7 +312,7 @@ class StartStateCurriculum(VecEnvWrapper):
 
     def _show(self, rows: Int64, observations: Any) -> None:
         simulation = self.environments.simulation
-        fresh = shape_observation(simulation.config, simulation.observe(rows))
+        fresh = shape_observation(simulation.config, simulation.entries, simulation.observe(rows))
         if isinstance(observations, dict):
             for name, values in observations.items():
                 values[rows] = fresh[name]

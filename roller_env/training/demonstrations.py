@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from roller_env.arrays import Float64
 from roller_env.config import EnvConfig, make_config
-from roller_env.envs.spaces import Observations, action_mode, observation_space
+from roller_env.envs.spaces import Observations, action_mode, entries_of, observation_space
 from roller_env.game.actions import ActionMode, forces
 from roller_env.level import load_level
 from roller_env.problems import shown
@@ -167,7 +167,7 @@ def _from_data_set(source: str, wanted: EnvConfig) -> list[Demonstration]:
 
 
 def _from_minari(data_set: Any, wanted: EnvConfig) -> list[Demonstration]:
-    found, needed = data_set.observation_space, observation_space(wanted)
+    found, needed = data_set.observation_space, observation_space(wanted, entries_of(wanted))
     if found != needed:
         raise DemonstrationError(
             f"{data_set.id}: its observations are {_brief(found)}; the training's are "

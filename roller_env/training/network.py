@@ -10,7 +10,7 @@ from gymnasium import Space, spaces
 from stable_baselines3.common.policies import ActorCriticPolicy, MultiInputActorCriticPolicy
 from stable_baselines3.common.preprocessing import is_image_space
 
-from roller_env.envs.spaces import action_space, observation_space
+from roller_env.envs.spaces import action_space, entries_of, observation_space
 from roller_env.training.config import TrainingConfig
 
 Weights = dict[str, torch.Tensor]
@@ -45,7 +45,7 @@ def network_spaces(config: TrainingConfig, clip: float | None) -> tuple[Space[An
         config: says in what environment.
         clip: largest magnitude of normalised observations; None if they are not normalised.
     """
-    seen = observation_space(config.environment)
+    seen = observation_space(config.environment, entries_of(config.environment))
     if clip is not None and is_image_space(seen):
         # As VecNormalize says of pictures that it has normalised.
         seen = spaces.Box(-clip, clip, seen.shape, np.float32)
