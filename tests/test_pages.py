@@ -15,7 +15,13 @@ from PIL import Image
 
 import roller_env
 from roller_env.config import EnvConfig
-from roller_env.game.observations import RAY_ENTRIES, STATE_ENTRIES, markdown_table
+from roller_env.game.observations import (
+    MORE_ENTRIES,
+    RAY_ENTRIES,
+    STATE_ENTRIES,
+    STATE_SIZE,
+    markdown_table,
+)
 from roller_env.game.rewards import RewardWeights
 from roller_env.level import LevelError, parse_level
 from scripts import draw_architecture
@@ -31,6 +37,7 @@ every_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.re
 
 def test_the_observation_table_is_the_one_the_code_makes() -> None:
     assert markdown_table(STATE_ENTRIES + RAY_ENTRIES) in ENVIRONMENTS
+    assert markdown_table(MORE_ENTRIES, STATE_SIZE) in ENVIRONMENTS
 
 
 def test_every_option_is_in_the_table() -> None:

@@ -18,7 +18,7 @@ from roller_env.arrays import Float64
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
 from roller_env.pieces.look import METAL
-from roller_env.pieces.piece import Solid
+from roller_env.pieces.piece import UNTURNED, UPWARDS, Solid
 
 Colour = tuple[float, float, float, float]
 
@@ -36,6 +36,9 @@ _OTHER_STYLE: Final = ("#444444", "D")
 
 _PALE: Final = 0.4
 """Share of white in the level's colours, so that the paths stand out from them."""
+
+_PALE_ALPHA: Final = 0.25
+"""Opacity of where something will be."""
 
 _WIDTH_IN: Final = 12.0
 _MARGIN_M: Final = 1.5
@@ -130,14 +133,26 @@ def _coloured(level: Level, pieces: Iterable[Solid]) -> list[tuple[Solid, Colour
 
 
 def _machine_boxes(level: Level) -> list[tuple[Solid, Colour]]:
-    """Return what moves or does something as boxes, in the colours in which it waits."""
+    """Return what moves or does something as boxes, in the colours in which it waits.
+
+    Whose other end is elsewhere in the plan is there too, paler.
+    """
     colours: dict[str, str] = {}
+    fields: list[Solid] = []
     for source, piece in level.pieces():
-        for paint in (paint for shape in piece.looks(0) for paint in shape.paints):
-            colours.setdefault(source, paint.colour)
+        for shape in piece.looks(0):
+            for paint in shape.paints:
+                colours.setdefault(source, paint.colour)
+            # A field without substance that fills the place of its piece.
+            if shape.form == "box" and shape.at == getattr(piece, "at", None):
+                fields.append(Solid(shape.at, shape.size, UNTURNED, "", source))
     everything = expand(level)
-    machines = (*(mover.solid for mover in everything.movers), *everything.machines)
-    return [(solid, _rgba(colours.get(solid.source, METAL.colour))) for solid in machines]
+    machines = (*(mover.solid for mover in everything.movers), *everything.machines, *fields)
+    ends = [mover.end for mover in everything.movers if mover.along != UPWARDS]
+    return [
+        *((end, (*_rgba(METAL.colour)[:3], _PALE_ALPHA)) for end in ends),
+        *((solid, _rgba(colours.get(solid.source, METAL.colour))) for solid in machines),
+    ]
 
 
 def _side_limits(storeys: Sequence[_Storey], paths: Sequence[Float64]) -> tuple[Float64, Float64]:

@@ -156,12 +156,12 @@ def split(observation: Float32, parts: Sequence[Entry]) -> dict[str, Float32]:
     return {name: observation[..., where] for name, where in layout(parts).items()}
 
 
-def markdown_table(parts: Iterable[Entry]) -> str:
-    """Return the entries as the table that docs/environments.md shows."""
+def markdown_table(parts: Iterable[Entry], begin: int = 0) -> str:
+    """Return the entries as a table of docs/environments.md, in which the first has an index."""
     lines = ["| index | name | meaning | unit | frame | range |", "|---|---|---|---|---|---|"]
     parts = tuple(parts)
     for entry, where in zip(parts, layout(parts).values(), strict=True):
-        first, last = where.start, where.stop - 1
+        first, last = begin + where.start, begin + where.stop - 1
         index = f"{first}" if first == last else f"{first} to {last}"
         low, high = f"{entry.low:g}", f"{entry.high:g}"
         lines.append(

@@ -93,7 +93,11 @@ class GameState(NamedTuple):
     @property
     def achieved(self) -> Bool:
         """(N, A) what is done once in an episode: coins taken, plates struck, triggers spent."""
-        flags = [array for array in _leaves(self.kinds) if array.dtype == bool and array.ndim == 2]
+        flags = [
+            getattr(own, deed)
+            for rules, own in zip(RULES, self.kinds, strict=True)
+            for deed in rules.deeds
+        ]
         return np.concatenate(flags, axis=1)
 
     @property

@@ -127,9 +127,12 @@ def reach(level: Level, play: Play) -> Reach | None:
     Plates that can be struck are down and their gates open from then on.
 
     Returns:
-        What can be reached; None where that cannot be told: the ball starts over nothing, or the
-        level is too large for the ball to be searched in a few seconds.
+        What can be reached; None where that cannot be told: the ball starts over nothing, the level
+        has pieces that take it where the search does not, such as platforms, or it is too large for
+        the ball to be searched in a few seconds.
     """
+    if not all(kind.is_searched for kind in expand(level).pieces):
+        return None
     coins = expand(level).coins
     found = Reach(np.zeros(len(coins), bool), np.zeros(len(level.plates), bool), False, {})
     while True:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -44,6 +44,8 @@ class Bumper(Piece):
     as fast as ``speed`` says; its other motion does not change. It happens at the end of the
     control step.
     """
+
+    is_searched: ClassVar[bool] = False
 
     at: Point = Field(description="Its centre.")
     size: Size = Field(description="Full edge lengths.")

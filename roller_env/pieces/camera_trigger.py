@@ -211,6 +211,11 @@ def _wait(delay_s: Float64) -> None:
 
 
 CAMERA_TRIGGER: Final = Rules(
-    name="camera_trigger", table=_table, state=_state, notice=_notice, react=_react
+    name="camera_trigger",
+    table=_table,
+    state=_state,
+    deeds=("spent",),
+    notice=_notice,
+    react=_react,
 )
 CameraTrigger.rules = CAMERA_TRIGGER

@@ -310,6 +310,7 @@ COIN: Final = Rules(
     name="coin",
     table=_table,
     state=_state,
+    deeds=("taken",),
     is_basic=True,
     entries=(
         fraction_entry("coins_left", "share of the level's coins still to collect"),

@@ -49,6 +49,7 @@ class Fan(Piece):
     """
 
     receives: ClassVar[bool] = True
+    is_searched: ClassVar[bool] = False
 
     at: Point = Field(description="Centre of the box.")
     size: Size = Field(description="Full edge lengths.")

@@ -142,12 +142,14 @@ class Piece(Part):
 
     Attributes:
         receives: whether plates and switches can tell it something, by its name.
+        is_searched: whether `roller_env.level.reach` knows what it can do for the ball.
         is_pipe: whether its solids are pipes, not decks: it says itself how they look, and a map
             may be cut through them.
         rules: what the kind does in a game; None for what is only solid.
     """
 
     receives: ClassVar[bool] = False
+    is_searched: ClassVar[bool] = True
     is_pipe: ClassVar[bool] = False
     rules: ClassVar[Rules[Any, Any] | None] = None
 

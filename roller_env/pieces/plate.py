@@ -222,6 +222,7 @@ PLATE: Final = Rules(
     name="plate",
     table=_table,
     state=_state,
+    deeds=("struck", "down"),
     is_basic=True,
     entries=(
         place_entry("plate", "centre of the nearest plate not yet struck; 0 if none"),

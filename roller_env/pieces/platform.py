@@ -60,6 +60,7 @@ class Platform(Piece):
     """
 
     receives: ClassVar[bool] = True
+    is_searched: ClassVar[bool] = False
 
     name: Name = Field(description="For plates and switches; no two pieces share one.")
     at: Point = Field(description="Its centre at the start.")

@@ -239,6 +239,8 @@ class Rules(Generic[TableT, StateT]):
         table: makes the kind's numbers of L levels, a NamedTuple of arrays (L, ...).
         state: makes, of a table and a number N, the state at the start of an episode: a NamedTuple
             of arrays (N, ...).
+        deeds: fields of the state, (N, k) bools, that become true once in an episode, as an
+            achievement.
         entries: what an observation shows of it.
         is_basic: whether it shows them in every level; otherwise only where there are such pieces.
         act: a hook with `Before`: adds forces on the ball, and says how its movers go.
@@ -250,6 +252,7 @@ class Rules(Generic[TableT, StateT]):
     name: str
     table: Callable[[Sequence[ExpandedLevel]], TableT]
     state: Callable[[TableT, int], StateT]
+    deeds: tuple[str, ...] = ()
     entries: tuple[Entry, ...] = ()
     is_basic: bool = False
     act: Hook = nothing

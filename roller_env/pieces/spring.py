@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -42,6 +42,8 @@ class Spring(Piece):
     across it nothing changes. It happens at the end of the control step, each time that the ball
     comes to touch it.
     """
+
+    is_searched: ClassVar[bool] = False
 
     at: Point = Field(description="Its centre.")
     size: Size = Field(description="Full edge lengths.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 from pydantic import Field
@@ -41,6 +41,8 @@ class Switch(Piece):
     On it is `once` touched for good; with `toggle` until it is touched again; with `hold` while the
     ball touches it; `timed` for a while since the ball came to touch it last.
     """
+
+    is_searched: ClassVar[bool] = False
 
     at: Point = Field(description="Its centre.")
     size: Size = Field(description="Full edge lengths.")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -41,6 +41,8 @@ class Teleporter(Piece):
     The ball is there at the end of the control step, with the velocity and the spin that it then
     has.
     """
+
+    is_searched: ClassVar[bool] = False
 
     at: Point = Field(description="Its centre.")
     size: Size = Field(description="Full edge lengths.")

@@ -14,6 +14,7 @@ import numpy as np
 
 from roller_env.arrays import Float64, Int64
 from roller_env.pieces.coin import COIN
+from roller_env.pieces.platform import PLATFORM
 from roller_env.simulation import Simulation, Snapshot
 
 CELL_M: Final = 1.0
@@ -151,4 +152,8 @@ def cells(simulation: Simulation) -> Int64:
     left = np.where(simulation.coins_in_level - state.coins <= _FEW_LEFT, 1, 0)
     which = left * (taken @ (1 + np.arange(taken.shape[1])) ** 2)
     done = np.stack([state.coins, state.achieved.sum(axis=1), which], axis=1)
-    return np.ascontiguousarray(np.concatenate([place, done, state.signals], axis=1))
+    # Where a platform is when one comes somewhere says whether one can go on.
+    own = simulation.table.own(PLATFORM)
+    moved = simulation.qpos[:, 7 + own.mover : 7 + own.mover + own.movers]
+    parts = (place, done, state.signals, np.floor(moved / CELL_M).astype(np.int64))
+    return np.ascontiguousarray(np.concatenate(parts, axis=1))

@@ -12,9 +12,12 @@ from roller_env.arrays import Float64, Int64
 from roller_env.config import EnvConfig, make_config
 from roller_env.game.actions import DIRECTIONS, forces
 from roller_env.level import Level
+from roller_env.level.expand import expand
 from roller_env.level.generate import generate
-from roller_env.pieces.coin import COIN
+from roller_env.pieces.coin import COIN, COIN_REACH_M
 from roller_env.pieces.finish import FINISH
+from roller_env.pieces.hazard import HAZARD
+from roller_env.pieces.platform import PLATFORM
 from roller_env.replay.contents import Replay
 from roller_env.replay.recorder import Recorder
 from roller_env.replay.scripted import steering
@@ -86,6 +89,7 @@ class Search:
         self._simulation.seed([seeding.np_random(seed)[0] for _ in range(GAMES)])
         self._simulation.reset()
         self.coins = int(self._simulation.coins_in_level[0])
+        self._lowest = _lowest(self._simulation.level)
         self.archive, self.steps = Archive(), 0
         self.best: Solution | None = None
         start = Node(ROOT, np.zeros(0, dtype=np.int64), 0, 0, self._simulation.snapshot(_ROW))
@@ -134,17 +138,32 @@ class Search:
         simulation, rng = self._simulation, self._rng
         table = simulation.table
         finish = table.regions.centre[0, table.own(FINISH).region]
-        regions = table.regions.centre[0][table.regions.real[0]]
+        own = table.own(HAZARD)
+        wanted = table.regions.real[0].copy()
+        wanted[own.region : own.region + own.regions] = False
+        regions = table.regions.centre[0][wanted]
+        platforms = self._platforms()
         coins, taken = table.of(COIN).at[0], simulation.state.of(COIN).taken
         aims = np.full((GAMES, 3), np.nan)
         for row in np.flatnonzero(rng.random(GAMES) < _HEADS):
             left = coins[~taken[row]] if len(coins) else coins
             ball = simulation.ball_position[row]
             near = left[np.argsort(np.linalg.norm(left - ball, axis=1), kind="stable")[:_NEAR]]
-            # A plate, a pad or a tube is a region as the finish is.
+            # A plate, a pad or a switch is a region as the finish is.
             places = [*near, finish, regions[rng.integers(len(regions))]]
+            if platforms.shape[1]:
+                places.append(platforms[row, rng.integers(platforms.shape[1])])
             aims[row] = places[rng.integers(len(places))]
         return aims
+
+    def _platforms(self) -> Float64:
+        """Return (N, P, 3) where the platforms are."""
+        simulation, movers = self._simulation, self._simulation.table.movers
+        own = simulation.table.own(PLATFORM)
+        mine = slice(own.mover, own.mover + own.movers)
+        moved = simulation.qpos[:, 7 + own.mover : 7 + own.mover + own.movers]
+        places: Float64 = movers.centre[0, mine] + moved[..., None] * movers.along[0, mine]
+        return places
 
     def _steered(self, held: Int64, aims: Float64) -> Int64:
         """Return what each game holds now, (N,)."""
@@ -163,7 +182,8 @@ class Search:
         steps = simulation.state.steps
         now = cells(simulation)
         sooner: dict[bytes, int] = {}  # the row that came to each cell first
-        for row in np.flatnonzero(~simulation.state.over).tolist():
+        lost = simulation.ball_position[:, 2] < self._lowest
+        for row in np.flatnonzero(~(simulation.state.over | lost)).tolist():
             before = archive.steps_to(now[row])
             if before is None or steps[row] < before:
                 first = sooner.setdefault(now[row].tobytes(), row)
@@ -207,6 +227,17 @@ class Search:
         if not replay.result.success or replay.result.coins != solution.coins:
             raise RuntimeError(f"the play found does not repeat: {replay.result}")
         return replay
+
+
+def _lowest(level: Level) -> float:
+    """Return the height of the ball's centre, metres, under which there is nothing but the fall."""
+    everything = expand(level)
+    solids = (*everything.at_the_start, *(mover.end for mover in everything.movers))
+    boxes = [(s.centre[2], float(np.abs(s.rotation[2]) @ s.half_size)) for s in solids]
+    regions = [region for own in everything.regions.values() for region in own]
+    boxes += [(region.centre[2], region.half[2] + region.radius) for region in regions]
+    boxes += [(height, COIN_REACH_M) for height in everything.coins[:, 2].tolist()]
+    return min(middle - reach for middle, reach in boxes) - level.ball.radius
 
 
 def solve(
