@@ -26,7 +26,15 @@ MAX_PICTURE_EDGE: Final = 4096
 MAX_ENVS: Final = 10**6
 
 
-_NOT_OF_AN_EPISODE: Final = ("level", "camera", "render_mode", "width", "height", "num_threads")
+_NOT_OF_AN_EPISODE: Final = (
+    "level",
+    "kinds",
+    "camera",
+    "render_mode",
+    "width",
+    "height",
+    "num_threads",
+)
 """Options by which neither a game's steps change nor what its agent is paid."""
 
 

@@ -54,8 +54,8 @@ class Fan(Piece):
     at: Point = Field(description="Centre of the box.")
     size: Size = Field(description="Full edge lengths.")
     force_n: tuple[Force, Force, Force] = Field(description="Newtons along x, y and z.")
-    on: bool = Field(
-        True, description="Whether it blows at the start; plates and switches make it the contrary."
+    blows: bool = Field(
+        True, description="Whether it does at the start; plates and switches make it the contrary."
     )
     needs: Needs = Field(
         "any", description="Whether one of its plates and switches is enough, or only `all`."
@@ -70,9 +70,9 @@ class Fan(Piece):
         """Yield that it never blows."""
         if not any(self.force_n):
             yield Problem((*path, "force_n"), "found no force at all; wanted one that is not 0")
-        elif not self.on and self.name not in around.told:
-            message = "nothing switches it on; name it in a switch's 'sets', or leave it on"
-            yield Problem((*path, "on"), message)
+        elif not self.blows and self.name not in around.told:
+            message = "nothing switches it on; name it in a switch's 'sets', or let it blow"
+            yield Problem((*path, "blows"), message)
 
     def looks(self, number: int) -> Iterator[Shape]:
         """Yield the air, and streaks that run with the wind."""
@@ -103,7 +103,7 @@ class Fan(Piece):
 
     def phase(self, state: Any, row: int, number: int, arrived: bool) -> int:
         """Return whether it blows."""
-        return ACTIVE if self.on != bool(state.of(FAN).turned[row, number]) else IDLE
+        return ACTIVE if self.blows != bool(state.of(FAN).turned[row, number]) else IDLE
 
     def label(self) -> tuple[str, Vector]:
         """Return what it is."""
@@ -141,7 +141,7 @@ def _table(levels: Sequence[ExpandedLevel]) -> FanTable:
     fans = [level.of(Fan) for level in levels]
     return FanTable(
         force_n=padded([[fan.force_n for fan in row] for row in fans], (3,)),
-        on=padded([[fan.on for fan in row] for row in fans]) > 0.0,
+        on=padded([[fan.blows for fan in row] for row in fans]) > 0.0,
         needed=needed_by(Fan, levels),
     )
 

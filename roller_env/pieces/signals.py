@@ -48,7 +48,7 @@ def votes_of(kind: type[Piece], levels: Sequence[ExpandedLevel]) -> Bool:
             for index, piece in enumerate(level.pieces.get(receiver, ()))
         }
         for row, piece in zip(votes[number], level.pieces.get(kind, ()), strict=False):
-            row[[names[name] for name in piece.signals()]] = True
+            row[[names[name] for name in piece.signals() if name in names]] = True
     return votes
 
 

@@ -42,7 +42,7 @@ class Post(Piece):
 
     def mover(self, source: str) -> Mover:
         x, y, z = self.at
-        return Mover(self.name, Solid((x, y, z + 1), (0.2,) * 3, UNTURNED, "", source), z, 0.5)
+        return Mover.down(self.name, Solid((x, y, z + 1), (0.2,) * 3, UNTURNED, "", source), z, 0.5)
 
     def region(self, touch: float) -> Region:
         return Region(self.at, (0.5, 0.5, 0.1), touch)

@@ -80,7 +80,7 @@ def test_wind_stops_where_its_box_ends(physics: str) -> None:
 
 
 def test_a_fan_can_be_switched_on_and_off() -> None:
-    fan = EVERYWHERE | {"force_n": (1.0, 0.0, 0.0), "on": False, "name": "gust"}
+    fan = EVERYWHERE | {"force_n": (1.0, 0.0, 0.0), "blows": False, "name": "gust"}
     plate = {"at": (0.0, 0.0, 0.0), "size": (1.0, 1.0, 0.1), "sets": ["gust"], "mode": "hold"}
     game = Game(make_level(fans=[fan], switches=[plate]))
     game.play(0.5)

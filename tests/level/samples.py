@@ -27,7 +27,7 @@ falls: checkpoint
 time_limit_s: 90
 ball: {radius: 16, mass_kg: 1, friction: 0.3, elasticity: 0}
 start: {at: [0, 0, 16], jitter: [4, 4]}
-finish: {at: [900, 0, 16], size: [32, 32, 32]}
+finish: {at: [900, 0, 16], size: [32, 32, 32], needs_coins: 3}
 materials:
   ice: {friction: 0.1, elasticity: 0.5, colour: "#eeffff", pattern: checker}
 floors:
@@ -42,7 +42,13 @@ floors:
     legend:
       W: {material: ice, coin: false, wall: 32}
 boxes:
-  - {at: [500, 0, -8], size: [800, 200, 16], yaw_deg: 0, pitch_deg: 0, material: ice, name: road}
+  - at: [500, 0, -8]
+    size: [800, 200, 16]
+    roll_deg: 0
+    yaw_deg: 0
+    pitch_deg: 0
+    material: ice
+    name: road
 ramps:
   - {start: [900, 0, 0], end: [1000, 0, 50], width: 64, thickness: 8, material: default, name: up}
 walls:
@@ -70,7 +76,42 @@ coins:
 plates:
   - {name: button, at: [400, 0, 72], size: [48, 48, 20], opens: [door], sinks_to: 67, speed: 1.6}
 gates:
-  - {name: door, at: [450, 0, 32], size: [8, 128, 64], yaw_deg: 5, lowers_to: -32, speed: 32}
+  - name: door
+    at: [450, 0, 32]
+    size: [8, 128, 64]
+    yaw_deg: 5
+    lowers_to: -32
+    speed: 32
+    needs: all
+    closes: true
+switches:
+  - {at: [420, 60, 2], size: [32, 32, 4], sets: [door], mode: timed, duration_s: 3, name: field}
+platforms:
+  - name: ferry
+    at: [1100, 0, -8]
+    to: [1200, 0, -8]
+    size: [64, 64, 16]
+    yaw_deg: 0
+    speed: 48
+    wait_s: 1
+    returns: true
+    needs: any
+    material: ice
+fans:
+  - at: [500, 0, 64]
+    size: [64, 64, 64]
+    force_n: [0, 2, 0]
+    blows: true
+    needs: any
+    name: gust
+springs:
+  - {at: [550, 60, 2], size: [32, 32, 4], velocity: [0, 0, 200], name: hop}
+bumpers:
+  - {at: [580, 60, 16], size: [24, 24, 32], speed: 160, name: post}
+teleporters:
+  - {at: [600, 60, 32], size: [16, 32, 64], to: [700, 60, 16], name: portal}
+hazards:
+  - {at: [750, 60, 2], size: [32, 32, 4], name: lava}
 lift_pads:
   - {at: [300, 300, 4], size: [32, 32, 8], force_n: 12.7, duration_s: 5, name: lift}
 checkpoints:

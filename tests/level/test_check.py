@@ -49,7 +49,8 @@ def test_a_plate_may_only_open_gates_that_exist() -> None:
 
 def test_a_plate_cannot_open_where_there_are_no_gates() -> None:
     text = message(plates=[PLATE | {"opens": ["gate"]}])
-    assert text == "plates[0].opens[0]: the level has no gates that a plate could open"
+    none = "the level has nothing that it could tell: no gate, no platform, no fan with a name"
+    assert text == f"plates[0].opens[0]: {none}"
 
 
 def test_a_plate_that_opens_nothing_is_a_fault() -> None:

@@ -67,7 +67,7 @@ def test_no_example_of_the_page_is_warned_of_what_it_says_itself(example: str) -
     # An example without a floor has none; and what the test adds lies where nothing leads.
     if all(
         f"{kind}:" not in example
-        for kind in ("floors", "boxes", "ramps", "walls", "tubes", "lift_pads")
+        for kind in ("floors", "boxes", "ramps", "walls", "tubes", "lift_pads", "bumpers")
     ):
         assert [problem.path for problem in found] == [()]
     elif re.search(r"^start:", example, re.MULTILINE):

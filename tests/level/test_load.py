@@ -490,7 +490,7 @@ BROKEN_MEANING = {
         SMALL + "gates:\n  - {name: door, at: [300, 0, 32], size: [8, 99, 64]}\n"
         "plates:\n  - {name: a, at: [99, 0, 70], size: [32, 32, 20], opens: [door, dor]}\n",
         [
-            "10:66: plates[0].opens[1]: no gate is called 'dor'; there are 'door' "
+            "10:66: plates[0].opens[1]: nothing that can be told is called 'dor'; there are 'door' "
             "(did you mean 'door'?)"
         ],
     ),

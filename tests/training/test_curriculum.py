@@ -160,7 +160,8 @@ def test_what_is_shown_is_the_game_that_goes_on(observation: str) -> None:
     for _ in range(150):
         shown, _, dones, _ = curriculum.step(FORWARD)
         begun += int(dones.sum())
-        expected = shape_observation(simulation.config, simulation.observe(np.arange(ROWS)))
+        seen = simulation.observe(np.arange(ROWS))
+        expected = shape_observation(simulation.config, simulation.entries, seen)
         if isinstance(shown, dict):
             assert all(np.array_equal(shown[name], expected[name]) for name in expected)
         else:
