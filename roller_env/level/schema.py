@@ -140,6 +140,9 @@ class Level(Part):
         "`checkpoint` that it touched.",
     )
     time_limit_s: Seconds = Field(120.0, description="An episode ends after this long.")
+    par_time_s: Seconds | None = Field(
+        None, description="Time in which a good player collects all coins and finishes."
+    )
     ball: Ball = Ball()
     start: Start
     finish: Finish

@@ -102,12 +102,12 @@ def test_the_compiled_model_steps_like_any_mujoco_model(compiled: CompiledLevel)
 
 
 @pytest.mark.parametrize("name", shipped_levels())
-def test_there_is_one_joint_and_one_actuator_for_each_plate_and_gate_and_no_other(
+def test_there_is_one_joint_and_one_actuator_for_each_thing_that_moves_and_no_other(
     name: str,
 ) -> None:
     level = load_level(name)
     model = compile_level(level).model
-    movers = [plate.name for plate in level.plates] + [gate.name for gate in level.gates]
+    movers = [piece.name for piece in (*level.plates, *level.gates, *level.platforms)]
     assert names(model, "joint") == [BALL, *movers]
     assert names(model, "actuator") == [*FORCE_ACTUATORS, *movers]
     slides = [model.joint(mover).type[0] for mover in movers]

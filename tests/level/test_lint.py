@@ -21,6 +21,7 @@ from roller_env.pieces.coin import Coins
 from roller_env.problems import FieldPath, Problem
 from roller_env.replay import frames, load_replay, shipped_replays
 from roller_env.units import quants
+from tests.builders import ORIGINALS
 from tests.level.samples import SMALL, small_level
 from tests.level.test_docs import EXAMPLES, LEFT_OUT, completed
 from tests.replay.recording import wandered
@@ -222,7 +223,7 @@ def test_a_floor_too_thin_for_the_falls_onto_it_is_warned_of() -> None:
     assert warned(boxes=[tower, thin, under], **changes) == []
 
 
-@pytest.mark.parametrize("name", shipped_levels())
+@pytest.mark.parametrize("name", ORIGINALS)
 def test_wherever_a_ball_has_been_a_coin_is_within_reach(name: str) -> None:
     """Coins are put where the ball was in the shipped demonstration, in the air as well."""
     replay = load_replay(shipped_replays()[name])
