@@ -26,3 +26,12 @@ for _id, _options in ENV_IDS.items():
         vector_entry_point="roller_env.envs.vector:RollerVectorEnv",
         kwargs=_options,
     )
+
+GENERATED_ID: Final = "Roller/Generated-v0"
+"""Games on generated levels, another one in every episode."""
+
+gym.register(
+    GENERATED_ID,
+    entry_point="roller_env.envs.generated:GeneratedEnv",
+    vector_entry_point="roller_env.envs.generated:GeneratedVectorEnv",
+)
