@@ -59,7 +59,7 @@ def test_it_is_made_again_from_its_spec() -> None:
 
 
 def test_a_level_that_nobody_proved_is_refused_and_what_there_is_is_told() -> None:
-    with pytest.raises(ValueError, match="found seed 77777 .* there are difficulty"):
+    with pytest.raises(ValueError, match=r"found seed 77777 .* there are difficulty"):
         gym.make(ID, start_level=77_777)
     with pytest.raises(ValueError, match="difficulty"):
         gym.make(ID, difficulty=0.123)
