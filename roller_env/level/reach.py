@@ -20,6 +20,7 @@ from roller_env.arrays import Bool, Float64
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
 from roller_env.pieces.coin import COIN_REACH_M
+from roller_env.pieces.convex import ConvexSolid
 from roller_env.pieces.finish import Finish
 from roller_env.pieces.lift_pad import LiftPad, pad_groups
 from roller_env.pieces.piece import Region, Solid
@@ -98,7 +99,7 @@ class Reach:
         coins: (coins,) whether each can be collected.
         plates: (plates,) whether each can be struck.
         finish: whether it can be touched.
-        landings: how hard the ball can come down, by the field of what it comes down on.
+        landings: how hard the ball can come down, by the field of the box it comes down on.
     """
 
     coins: Bool
@@ -269,7 +270,10 @@ class _Flood:
         return _Boxes(self._spans, low, high)
 
     def landings(self, motion: _Motion, solids: Sequence[Solid]) -> dict[str, Landing]:
-        """Return the deepest fall onto each solid that has been reached."""
+        """Return the deepest fall onto each box that has been reached.
+
+        Hulls are left out: how deep is too deep for one nobody has measured.
+        """
         spans = self._spans
         on = np.flatnonzero((self.away == 0) & (spans.kind != EDGE))
         drops = np.minimum(spans.ceiling[on], motion.rests) - spans.floor[on]
@@ -279,6 +283,8 @@ class _Flood:
         found: dict[str, Landing] = {}
         for number, index in zip(numbers.tolist(), order[first].tolist(), strict=True):
             solid, radius = solids[number], self._level.ball.radius
+            if isinstance(solid, ConvexSolid):
+                continue
             steepness = float(np.abs(solid.rotation[2]).max())
             across = steepness * (float(spans.under[on[index]]) + 2.0 * radius) - 2.0 * radius
             landing = Landing(float(drops[index]), steepness, across)
