@@ -194,7 +194,9 @@ def vertices(model: mujoco.MjModel, geom: int) -> np.ndarray:
     mesh = model.mesh(int(model.geom_dataid[geom]))
     first = int(mesh.vertadr[0])
     own = model.mesh_vert[first : first + int(mesh.vertnum[0])].astype(float)
-    return own @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+    turn = data.geom_xmat[geom].reshape(3, 3)
+    found: np.ndarray = own @ turn.T + data.geom_xpos[geom]
+    return found
 
 
 def test_the_vertices_of_a_hull_are_where_the_level_says() -> None:

@@ -18,12 +18,11 @@ BOX: dict[str, Any] = {"at": (4.0, 0.0, -0.1), "size": (3.0, 4.0, 1.0)}
 """A block in the lane whose upper face is 0.4 m over it."""
 
 
-def corners(
-    at: Vector, size: Vector, yaw_deg: float = 0.0, pitch_deg: float = 0.0
-) -> list[list[float]]:
-    """Return the corners of a box as the points of a hull, metres."""
-    own = np.array(list(product((-0.5, 0.5), repeat=3))) * size
-    found: list[list[float]] = (own @ np.array(rotation_matrix(yaw_deg, pitch_deg)).T + at).tolist()
+def corners(box: dict[str, Any]) -> list[list[float]]:
+    """Return the corners of a box of a level as the points of a hull, metres."""
+    own = np.array(list(product((-0.5, 0.5), repeat=3))) * box["size"]
+    rotation = rotation_matrix(box.get("yaw_deg", 0.0), box.get("pitch_deg", 0.0))
+    found: list[list[float]] = (own @ np.array(rotation).T + box["at"]).tolist()
     return found
 
 
@@ -47,7 +46,7 @@ def test_a_hull_with_the_corners_of_a_box_is_met_as_that_box_is(
     ways = []
     for pieces in (
         {"boxes": [GROUND, BOX | turned]},
-        {"hulls": [{"points": corners(**BOX, **turned)}]},
+        {"hulls": [{"points": corners(BOX | turned)}]},
     ):
         game = Game(make_level(**pieces), physics=physics)
         roll(game, (9.0, 0.2, 0.0))
@@ -61,7 +60,7 @@ def test_a_hull_with_the_corners_of_a_box_is_met_as_that_box_is(
 def test_a_ball_rests_on_a_hull_as_high_as_on_a_box(physics: str) -> None:
     block: dict[str, Any] = {"at": (0.0, 0.0, -1.0), "size": (4.0, 4.0, 2.0)}
     heights = []
-    for pieces in ({"boxes": [block]}, {"boxes": [], "hulls": [{"points": corners(**block)}]}):
+    for pieces in ({"boxes": [block]}, {"boxes": [], "hulls": [{"points": corners(block)}]}):
         game = Game(make_level(start={"at": (0.3, -0.2, 0.9)}, **pieces), physics=physics)
         heights.append(game.play(3.0)[-1, 2])
     assert heights[0] == pytest.approx(BALL_RADIUS_M, abs=1e-4)
@@ -71,7 +70,7 @@ def test_a_ball_rests_on_a_hull_as_high_as_on_a_box(physics: str) -> None:
 @both
 def test_rays_meet_a_hull_where_they_meet_the_box(physics: str) -> None:
     ball, seen = {"at": (0.0, 0.0, 0.9)}, []
-    for pieces in ({"boxes": [GROUND, BOX]}, {"hulls": [{"points": corners(**BOX)}]}):
+    for pieces in ({"boxes": [GROUND, BOX]}, {"hulls": [{"points": corners(BOX)}]}):
         level = make_level(start=ball, **pieces)
         game = Game(level, physics=physics, observation="rays")
         seen.append(game.simulation.observe())
@@ -147,7 +146,7 @@ def test_seams_between_boxes_and_hulls_on_level_ground(
         {"at": (2.0 * number, 0.0, -1.0), "size": (2.0, 6.0, 2.0)} for number in range(-1, 12)
     ]
     level = make_level(
-        boxes=blocks[::2], hulls=[{"points": corners(**block)} for block in blocks[1::2]]
+        boxes=blocks[::2], hulls=[{"points": corners(block)} for block in blocks[1::2]]
     )
     game = Game(level, physics=physics)
     game.play(0.5)
