@@ -25,7 +25,7 @@ from roller_env.pieces.finish import Finish
 from roller_env.pieces.lift_pad import LiftPad, pad_groups
 from roller_env.pieces.piece import Region, Solid
 from roller_env.pieces.plate import Plate
-from roller_env.pieces.spans import EDGE, SLOPE, Indices, Spans, free_spans
+from roller_env.pieces.spans import EDGE, FLAT, SLOPE, Indices, Spans, free_spans
 
 _CLIMB: Final = 0.9
 """How far, in radii, the ball's centre may rise from one column to the next while it rolls: that of
@@ -99,7 +99,7 @@ class Reach:
         coins: (coins,) whether each can be collected.
         plates: (plates,) whether each can be struck.
         finish: whether it can be touched.
-        landings: how hard the ball can come down, by the field of the box it comes down on.
+        landings: how hard the ball can come down, by the field of what it comes down on.
     """
 
     coins: Bool
@@ -270,12 +270,14 @@ class _Flood:
         return _Boxes(self._spans, low, high)
 
     def landings(self, motion: _Motion, solids: Sequence[Solid]) -> dict[str, Landing]:
-        """Return the deepest fall onto each box that has been reached.
+        """Return the deepest fall onto each solid that has been reached.
 
-        Hulls are left out: how deep is too deep for one nobody has measured.
+        Of a hull only the level face counts, and it as nowhere thinner than the hull is high.
         """
         spans = self._spans
-        on = np.flatnonzero((self.away == 0) & (spans.kind != EDGE))
+        is_hull = np.array([isinstance(solid, ConvexSolid) for solid in solids], dtype=bool)
+        onto_face = np.where(is_hull[spans.solid], spans.kind == FLAT, spans.kind != EDGE)
+        on = np.flatnonzero((self.away == 0) & onto_face)
         drops = np.minimum(spans.ceiling[on], motion.rests) - spans.floor[on]
         # The deepest fall onto each solid, and where it is thinnest of those.
         order = np.lexsort((spans.under[on], -drops))
@@ -283,10 +285,10 @@ class _Flood:
         found: dict[str, Landing] = {}
         for number, index in zip(numbers.tolist(), order[first].tolist(), strict=True):
             solid, radius = solids[number], self._level.ball.radius
-            if isinstance(solid, ConvexSolid):
-                continue
             steepness = float(np.abs(solid.rotation[2]).max())
             across = steepness * (float(spans.under[on[index]]) + 2.0 * radius) - 2.0 * radius
+            if is_hull[number]:
+                across = max(across, 2.0 * solid.half_size[2])
             landing = Landing(float(drops[index]), steepness, across)
             if solid.source not in found or landing.drop > found[solid.source].drop:
                 found[solid.source] = landing

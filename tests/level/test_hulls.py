@@ -212,14 +212,24 @@ def test_the_search_gets_up_a_wedge(wedges: list[dict[str, Any]], reached: bool)
     assert found.finish == reached
 
 
-def test_a_thin_hull_is_not_said_to_be_too_thin() -> None:
-    """For nobody has measured it."""
-    level = small_level(
-        boxes=[],
-        hulls=[{"points": list(product((-2.0, 18.0), (-3.0, 3.0), (-0.01, 0.0)))}],
-        start={"at": (0.0, 0.0, 0.4064)},
-    )
-    assert lint(level, PLAY) == []
+@pytest.mark.parametrize(
+    ("drop", "thickness", "warned"), [(9.0, 0.02, 0), (900.0, 0.02, 1), (900.0, 1.5, 0)]
+)
+def test_a_hull_is_too_thin_for_a_fall_where_a_box_is(
+    drop: float, thickness: float, warned: int
+) -> None:
+    """Measured: the ball passes through a slab from the same speed on, whichever it is."""
+    start, finish = {"at": (0.0, 0.0, drop + 1.0)}, {"at": (8.0, 0.0, 0.5), "size": (1.0, 1.0, 1.0)}
+    perch = {"at": (0.0, 0.0, drop), "size": (2.0, 2.0, 1.0)}
+    slab = {"at": (8.0, 0.0, -thickness / 2), "size": (40.0, 40.0, thickness)}
+    corners = product((-12.0, 28.0), (-20.0, 20.0), (-thickness, 0.0))
+    levels = [
+        small_level(start=start, finish=finish, boxes=[perch, *boxes], hulls=hulls)
+        for boxes, hulls in (([slab], []), ([], [{"points": list(corners)}]))
+    ]
+    messages = [[problem.message for problem in lint(level, PLAY)] for level in levels]
+    assert len(messages[0]) == warned
+    assert messages[0] == messages[1]
 
 
 # What can be wrong with it ------------------------------------------------------------------------
