@@ -167,18 +167,19 @@ def sides_of(points: Sequence[Vector]) -> tuple[Side, ...]:
     heights = [corners @ plane[:3] for plane in planes]
     if min(float(np.ptp(height)) for height in heights) < THINNEST_M:
         raise ValueError("the points are nearly in one plane")
+    vertices = given[found.vertices]
     return tuple(
-        _side(plane[:3], corners[height > height.max() - 2.0 * COPLANAR * size], middle)
+        _side(plane[:3], vertices[height > height.max() - 2.0 * COPLANAR * size])
         for plane, height in zip(planes, heights, strict=True)
     )
 
 
-def _side(normal: Float64, corners: Float64, middle: Float64) -> Side:
-    """Return the face with corners, (n, 3) relative to ``middle``, that come in any order."""
+def _side(normal: Float64, corners: Float64) -> Side:
+    """Return the face with corners, (n, 3) metres, that come in any order."""
     out = corners - corners.mean(axis=0)
     right = out[0] / np.linalg.norm(out[0])
     turned = np.argsort(np.arctan2(out @ np.cross(normal, right), out @ right), kind="stable")
-    around = corners[turned] + middle
+    around = corners[turned]
     # The farthest corner, so that none is beyond the face.
     offset = float((around @ normal).max())
     return Side(_vector(normal), offset, tuple(_vector(corner) for corner in around))

@@ -74,8 +74,9 @@ def test_a_yaw_of_90_makes_a_wedge_rise_towards_y() -> None:
 
 
 def test_points_inside_a_hull_change_nothing() -> None:
-    cube = list(product((-1.0, 1.0), repeat=3))
-    inside = [(0.5, 0.5, 0.0), (1.0, 0.2, 0.3), (0.0, 0.0, 0.0)]
+    """Nor do those on its faces and edges."""
+    cube = list(product((-1.1, 1.1), repeat=3))
+    inside = [(0.5, 0.5, 0.0), (1.1, 0.2, 0.3), (1.1, 0.2, 1.1), (1.1, 1.1, 0.0), (0.0, 0.0, 0.0)]
     hulls = [
         expand(small_level(hulls=[{"points": points}], start={"at": (5.0, 0.0, 0.5)})).solids[-1]
         for points in (cube, [*inside, *cube, *inside])
