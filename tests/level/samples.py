@@ -59,6 +59,12 @@ walls:
     thickness: 8
     material: default
     name: rail
+hulls:
+  - points: [[250, 60, 0], [290, 60, 0], [270, 90, 0], [270, 70, 30]]
+    material: ice
+    name: rock
+wedges:
+  - {at: [150, 60, 4], size: [32, 32, 8], yaw_deg: 90, material: ice, name: kicker}
 tubes:
   - start: [300, 300, 0]
     end: [300, 300, 900]
