@@ -25,6 +25,7 @@ gravity: 386
 kill_height: -1129
 falls: checkpoint
 time_limit_s: 90
+par_time_s: 45
 ball: {radius: 16, mass_kg: 1, friction: 0.3, elasticity: 0}
 start: {at: [0, 0, 16], jitter: [4, 4]}
 finish: {at: [900, 0, 16], size: [32, 32, 32], needs_coins: 3}
