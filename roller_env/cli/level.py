@@ -10,6 +10,8 @@ Examples::
     roller level draw mine.yaml --view overview -o mine.png
     roller level solve mine.yaml --robust
     roller level generate --seed 7 --difficulty 0.6
+    roller level import mine.map
+    roller level export gate -o gate.map
 """
 
 from __future__ import annotations
@@ -35,11 +37,13 @@ from roller_env.level import (
     parse_level,
 )
 from roller_env.level.expand import expand
+from roller_env.level.maps import export_map, read_map
 from roller_env.level.reach import Play
 from roller_env.level.template import new_level
-from roller_env.level.text import level_text
+from roller_env.level.text import fields_text, level_text
 from roller_env.physics.presets import physics_preset
 from roller_env.problems import Problem, printable, shown
+from roller_env.yaml_tree import MAX_BYTES
 
 Preset = Literal["fast", "default", "accurate", "rigid", "relaxed"]
 """The names of `PRESETS`; a test holds the two together."""
@@ -342,6 +346,55 @@ def mjcf(
     return _write(level_mjcf(loaded, physics), output)
 
 
+def import_map(
+    file: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE.map")],
+    output: Output = None,
+) -> int:
+    """Write a level file from a map of TrenchBroom or another editor for Quake.
+
+    What it did not understand, and what is wrong with the level, it says with the lines of the map.
+    The exit status is 1 if the level cannot be played; it is written all the same.
+
+    Args:
+        file: map, of the format Standard or Valve 220.
+        output: level file to write; by default the map's name and .yaml, in this directory.
+    """
+    found = read_map(file)
+    output = output or Path(f"{file.stem}.yaml")
+    if output.suffix not in (".yaml", ".yml"):
+        raise CommandError(f"{output}: the name of a level file must end in .yaml")
+    text = fields_text(found.fields)
+    if len(text.encode()) > MAX_BYTES:
+        raise CommandError(f"{file}: the level is too large for a file of {MAX_BYTES} bytes")
+    _write(text, output)
+    for note in found.notes:
+        print(_line(note, "note"))
+    try:
+        _, doubts = found.level()
+    except LevelError as error:
+        for problem in error.problems:
+            print(_line(problem, "error"))
+        return 1
+    for doubt in doubts:
+        print(_line(doubt, "warning"))
+    return 0
+
+
+def export(level: Annotated[str, tyro.conf.Positional], output: Output = None) -> int:
+    """Write a level as a map that TrenchBroom edits and 'roller level import' reads back.
+
+    Args:
+        level: name of a level, or a level file.
+        output: map to write; by default the level's name and .map, in this directory.
+    """
+    loaded = load_level(level)
+    exported = export_map(loaded)
+    _write(exported.text, output or Path(f"{loaded.name}.map"))
+    for note in exported.notes:
+        print(_line(note, "note"))
+    return 0
+
+
 def _write(text: str, output: Path | None) -> int:
     if output is None:
         print(text)
@@ -423,5 +476,7 @@ COMMANDS: Final[dict[str, Callable[..., int]]] = {
     "generate": generate,
     "schema": schema,
     "mjcf": mjcf,
+    "import": import_map,
+    "export": export,
 }
 """By name."""

@@ -65,7 +65,7 @@ def load_level(source: str | os.PathLike[str] | Level | Mapping[str, Any]) -> Le
         _warn(map(_without_a_place, doubts), stacklevel=3)
         return level
     path = _path_of(source)
-    filename, text = str(path), _decoded(_read(path), str(path))
+    filename, text = str(path), decoded(_read(path), str(path))
     level, doubts = _examined(_tree(lambda: read_tree(text, filename)), text, filename)
     _warn(doubts, stacklevel=3)
     return level
@@ -86,7 +86,7 @@ def examine_level(source: str | os.PathLike[str], play: Play) -> tuple[Level, tu
         LevelError: it cannot be played.
     """
     path = _path_of(source)
-    filename, text = str(path), _decoded(_read(path), str(path))
+    filename, text = str(path), decoded(_read(path), str(path))
     root = _tree(lambda: read_tree(text, filename))
     level, doubts = _examined(root, text, filename)
     found = (_placed(problem, root, filename) for problem in lint(level, play, _unit(root)))
@@ -208,7 +208,16 @@ def _read(path: Path) -> bytes:
     raise LevelError([replace(problem, filename=str(path))])
 
 
-def _decoded(data: bytes, filename: str) -> str:
+def decoded(data: bytes, filename: str) -> str:
+    """Return the text of a file that somebody wrote.
+
+    Args:
+        data: what is in it.
+        filename: what errors call it.
+
+    Raises:
+        LevelError: it is not UTF-8; says where.
+    """
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -110,7 +110,7 @@ def test_there_is_one_joint_and_one_actuator_for_each_thing_that_moves_and_no_ot
 ) -> None:
     level = load_level(name)
     model = compile_level(level).model
-    movers = [piece.name for piece in (*level.plates, *level.gates, *level.platforms)]
+    movers = [mover.name for mover in expand(level).movers]
     assert names(model, "joint") == [BALL, *movers]
     assert names(model, "actuator") == [*FORCE_ACTUATORS, *movers]
     slides = [model.joint(mover).type[0] for mover in movers]

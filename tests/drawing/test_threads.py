@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("opengl")
 
 Elsewhere = Callable[[Callable[[], Any]], Any]
 
-SMALL = {"width": 96, "height": 64}
+SMALL: dict[str, Any] = {"width": 96, "height": 64}
 
 
 def environment(level: str = "flat") -> RollerEnv:
