@@ -9,14 +9,12 @@ from typing import Any, Final
 
 import gymnasium as gym
 
+from roller_env.assets import LEVELS
+
 __version__ = "0.1.0"
 
 ENV_IDS: Final[dict[str, dict[str, Any]]] = {
-    "Roller/Classic-v0": {"level": "classic"},
-    "Roller/Flat-v0": {"level": "flat"},
-    "Roller/Bridge-v0": {"level": "bridge"},
-    "Roller/Gate-v0": {"level": "gate"},
-    "Roller/Lift-v0": {"level": "lift"},
+    **{f"Roller/{level.title()}-v0": {"level": level} for level in LEVELS},
     "Roller/Level-v0": {},
 }
 """Every Gymnasium id with the options it sets; `Roller/Level-v0` takes ``level=`` of any kind."""
@@ -28,3 +26,12 @@ for _id, _options in ENV_IDS.items():
         vector_entry_point="roller_env.envs.vector:RollerVectorEnv",
         kwargs=_options,
     )
+
+GENERATED_ID: Final = "Roller/Generated-v0"
+"""Games on generated levels, another one in every episode."""
+
+gym.register(
+    GENERATED_ID,
+    entry_point="roller_env.envs.generated:GeneratedEnv",
+    vector_entry_point="roller_env.envs.generated:GeneratedVectorEnv",
+)

@@ -12,12 +12,37 @@ from typing import Final, Literal
 
 from roller_env.problems import listed
 
-Kind = Literal["levels", "replays", "sounds", "configs"]
+Kind = Literal["levels", "replays", "sounds", "generated", "configs"]
+
+LEVELS: Final = (
+    "flat",
+    "corners",
+    "slopes",
+    "ice",
+    "bridge",
+    "wind",
+    "springs",
+    "pinball",
+    "gate",
+    "locks",
+    "portals",
+    "lava",
+    "lift",
+    "rails",
+    "race",
+    "ferry",
+    "elevators",
+    "maze",
+    "classic",
+    "finale",
+)
+"""The levels, from the easy ones to the hard ones, as people find them."""
 
 _IN_A_CHECKOUT: Final[dict[Kind, str]] = {
     "levels": "assets/levels",
     "replays": "assets/replays",
     "sounds": "assets/sounds",
+    "generated": "assets/generated",
     "configs": "configs",
 }
 

@@ -4,6 +4,7 @@ Examples::
 
     python scripts/generated.py
     python scripts/generated.py --seeds 100
+    python scripts/generated.py --prove 500 --difficulty 0.25
     python scripts/generated.py --quick --out runs/generated.csv
 """
 
@@ -19,6 +20,8 @@ import tyro
 from tqdm import tqdm
 
 from roller_env.lab import generated
+from roller_env.level.proved import read_verdicts, verdicts_file, write_verdicts
+from roller_env.solver import won_level
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,17 +37,40 @@ class Arguments:
     show: bool = False
     """Only print the table of the rows there are."""
 
+    prove: int | None = None
+    """Prove so many levels of one difficulty instead, and add them to the table that is shipped."""
+
+    difficulty: float = 0.25
+    """Of what is proved."""
+
+    first_seed: int = 0
+    """Of what is proved."""
+
     quick: bool = False
     """One seed of two difficulties."""
 
 
 def main(arguments: Arguments) -> None:
     """Do what the command line says."""
+    if arguments.prove is not None:
+        prove(arguments.difficulty, arguments.first_seed, arguments.prove)
+        return
     if not arguments.show:
         seeds = 1 if arguments.quick else arguments.seeds
         difficulties = (0.0, 0.25) if arguments.quick else generated.DIFFICULTIES
         generated.run(arguments.out, seeds, difficulties, _progress)
     print(generated.table(arguments.out))
+
+
+def prove(difficulty: float, first_seed: int, count: int) -> None:
+    """Add levels to the table of those that the solver has won; what is there already stays."""
+    file = verdicts_file()
+    table = read_verdicts(file) if file.exists() else {}
+    known = table.setdefault(difficulty, {})
+    seeds = [seed for seed in range(first_seed, first_seed + count) if seed not in known]
+    for seed in _progress(seeds):
+        known[seed] = won_level(seed, difficulty).attempts - 1
+        write_verdicts(table, file)
 
 
 def _progress(levels: list[Any]) -> Iterable[Any]:

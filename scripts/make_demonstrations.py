@@ -1,4 +1,4 @@
-"""Let the scripted player play, and keep what it does as replays.
+"""Let the scripted player play, or the solver where a level has no route, and keep replays of it.
 
 Without options it makes the demonstrations that are shipped, one a level; do so after changing a
 level, a material, a preset or the rules. With --rerecord it plays what is there again, action by
@@ -37,6 +37,10 @@ from roller_env.replay import (
 )
 from roller_env.replay.conversion import load_any, record_anew
 from roller_env.replay.scripted import PLAYER, ScriptedPlayer
+from roller_env.solver import Search
+
+BUDGET = 5_000_000
+"""Environment steps of the solver; on MuJoCo, some minutes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +100,13 @@ def demonstrate(level: Level, seed: int, arguments: Arguments) -> bool:
         except ReplayError as error:
             tqdm.write(f"{error}; not kept")
             return False
+    elif level.route is None:
+        search = Search(level, seed, arguments.physics)
+        solution = search.run(BUDGET, all_coins=True)
+        if solution is None:
+            tqdm.write(f"{level.name}, seed {seed}: not won in {search.steps:,} steps; not kept")
+            return False
+        replay = search.replay(solution)
     else:
         player = ScriptedPlayer(level, action_noise=arguments.action_noise, seed=seed)
         replay = record_episode(config, player, seed=seed, player=PLAYER)

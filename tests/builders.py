@@ -22,6 +22,12 @@ from roller_env.units import quants
 Float64 = npt.NDArray[np.float64]
 Vector = tuple[float, float, float]
 
+ORIGINALS: Final = ("bridge", "classic", "flat", "gate", "lift")
+"""Levels with the original game's pieces and a route: for what would take too long on all."""
+
+VARIED: Final = ("classic", "flat", "gate", "lift", "elevators", "finale")
+"""Levels among which every kind of piece is."""
+
 BALL_RADIUS_M: Final = 0.4064
 GRAVITY: Final = 9.8044
 WEIGHTLESS: Final = 0.001

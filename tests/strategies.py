@@ -21,6 +21,7 @@ from roller_env.pieces.fields import METRES_PER_UNIT
 from roller_env.pieces.finish import Finish
 from roller_env.pieces.floor import FloorCell, FloorPlan
 from roller_env.pieces.gate import Gate
+from roller_env.pieces.hull import Hull, Wedge
 from roller_env.pieces.lift_pad import LiftPad
 from roller_env.pieces.plate import Plate
 from roller_env.pieces.ramp import Ramp
@@ -28,6 +29,7 @@ from roller_env.pieces.tube import Opening, Tube
 from roller_env.pieces.wall import Wall
 
 SLOT_M = 6.0
+Scenery = Box | Ramp | Wall | Hull | Wedge | Tube
 OVERHEAD_M = 20.0
 """Over all that is solid."""
 LANE_HALF_WIDTH_M = 3.0
@@ -117,12 +119,20 @@ def _lane(
     slots: int,
     origin: Origin,
     surface: st.SearchStrategy[str],
-    scenery: list[Box | Ramp | Wall | Tube],
+    scenery: list[Scenery],
 ) -> dict[str, Any]:
     """The pieces by kind: the scenery, and the lane as one box or as a floor plan."""
-    kinds = (("boxes", Box), ("ramps", Ramp), ("walls", Wall), ("tubes", Tube))
+    kinds = {
+        "boxes": Box,
+        "ramps": Ramp,
+        "walls": Wall,
+        "hulls": Hull,
+        "wedges": Wedge,
+        "tubes": Tube,
+    }
     pieces: dict[str, Any] = {
-        field: tuple(piece for piece in scenery if isinstance(piece, kind)) for field, kind in kinds
+        field: tuple(piece for piece in scenery if isinstance(piece, kind))
+        for field, kind in kinds.items()
     }
     length, thickness = (slots + 2) * SLOT_M, draw(numbers(0.1, 2.0))
     if draw(st.booleans()):
@@ -143,14 +153,12 @@ def _lane(
 
 
 @st.composite
-def _scenery(
-    draw: Draw, slot: int, origin: Origin, surface: st.SearchStrategy[str]
-) -> Box | Ramp | Wall | Tube:
+def _scenery(draw: Draw, slot: int, origin: Origin, surface: st.SearchStrategy[str]) -> Scenery:
     """One static piece beside the lane, near enough for a ball that falls off to meet it."""
     x, y, z = _moved(origin, (slot * SLOT_M, draw(st.sampled_from([-6.5, 6.5])), 0.0))
     size = draw(numbers(0.1, 2.0))
     material = draw(surface)
-    kind = draw(st.sampled_from([Box, Ramp, Wall, Tube]))
+    kind = draw(st.sampled_from([Box, Ramp, Wall, Hull, Wedge, Tube]))
     if kind is Box:
         yaw, pitch = draw(numbers(-360.0, 360.0)), draw(numbers(-60.0, 60.0))
         edges = (size, draw(numbers(0.1, 3.0)), draw(numbers(0.1, 1.0)))
@@ -162,6 +170,15 @@ def _scenery(
         corner = (x + draw(numbers(-1.5, 1.5)), y + draw(numbers(0.2, 1.5)))
         height = draw(numbers(0.1, 3.0))
         return Wall(start=(x, y), end=corner, bottom=z, height=height, material=material)
+    if kind is Wedge:
+        edges = (size, draw(numbers(0.1, 3.0)), draw(numbers(0.1, 1.0)))
+        return Wedge(at=(x, y, z), size=edges, yaw_deg=draw(numbers(-360, 360)), material=material)
+    if kind is Hull:
+        # Four that span a volume, and any others.
+        own = [(-size, -0.5, 0.0), (size, -0.5, 0.0), (0.0, 0.5, 0.0), (0.0, 0.0, 0.5)]
+        own += draw(st.lists(st.tuples(*[numbers(-1.5, 1.5)] * 3), max_size=12))
+        points = tuple(_moved((x, y, z), point) for point in own)
+        return Hull(points=points, material=material)
     opening = st.builds(Opening, toward_deg=numbers(-180, 180), width_deg=numbers(10.0, 90.0))
     return Tube(
         start=(x, y, z),

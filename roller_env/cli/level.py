@@ -247,8 +247,9 @@ def solve(
     robust: bool = False,
     budget: int = 5_000_000,
     seed: int = 0,
+    physics: Preset = "rigid",
 ) -> int:
-    """Search for a play that ends at the finish, on the rigid engine, and write it as a replay.
+    """Search for a play that ends at the finish, and write it as a replay.
 
     It needs no route. The exit status is 1 if none was found in the budget, which does not say that
     there is none.
@@ -261,6 +262,8 @@ def solve(
             starts, on the rigid engine and on MuJoCo's default.
         budget: environment steps to search for; a million take some seconds.
         seed: of the search.
+        physics: preset to search on; MuJoCo's take thirty times as long. Robust plays are searched
+            on the rigid engine.
     """
     if budget < 1:
         raise CommandError(f"--budget: found {budget}; must be 1 or more")
@@ -274,7 +277,7 @@ def solve(
         proof = prove(loaded, budget, all_coins, seed)
         replay, steps = (None, budget) if proof is None else (proof.replay, proof.steps)
     else:
-        proof, search = None, Search(loaded, seed)
+        proof, search = None, Search(loaded, seed, physics)
         solution = search.run(budget, all_coins)
         replay = None if solution is None else search.replay(solution)
         steps = search.steps

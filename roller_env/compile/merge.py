@@ -24,7 +24,7 @@ Rectangle = tuple[int, int, int, int]
 
 
 def merge_solids(solids: Iterable[Solid]) -> list[Solid]:
-    """Return boxes that fill exactly the space of ``solids``, coplanar ones merged; never more.
+    """Return solids that fill exactly the space of ``solids``, coplanar ones merged; never more.
 
     Only axis-aligned boxes with equal vertical extent and equal material merge. The order of
     first appearance is kept, so equal levels give equal models.

@@ -17,6 +17,7 @@ from roller_env.level.expand import expand
 from roller_env.level.schema import Level, Material
 from roller_env.physics.materials import contact_parameters
 from roller_env.physics.presets import PhysicsPreset
+from roller_env.pieces.convex import ConvexSolid
 from roller_env.pieces.piece import Mover, Solid, path_of
 
 BALL: Final = "ball"
@@ -139,10 +140,15 @@ def machine_name(solid: Solid) -> str:
 
 
 def _add_solid(spec: mujoco.MjSpec, solid: Solid, contact: dict[str, object], name: str) -> None:
+    shape: dict[str, object] = {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": solid.half_size}
+    if isinstance(solid, ConvexSolid):
+        # About its middle: MuJoCo keeps vertices in single precision.
+        corners = solid.corners() - solid.centre
+        spec.add_mesh(name=name, uservert=corners.ravel())
+        shape = {"type": mujoco.mjtGeom.mjGEOM_MESH, "meshname": name}
     spec.worldbody.add_geom(
         name=name,
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=solid.half_size,
+        **shape,
         pos=solid.centre,
         quat=quaternion(np.array(solid.rotation)),
         **contact,

@@ -17,7 +17,7 @@ from roller_env.physics.presets import FrictionLaw
 from roller_env.physics.protocol import Columns, Path
 from roller_env.physics.rigid.law import COULOMB, LAWS, ContactLaw
 from roller_env.physics.rigid.rays import cast_rays
-from roller_env.physics.rigid.scene import STATIC, RigidLevel, SolidBox, pack
+from roller_env.physics.rigid.scene import STATIC, RigidLevel, SolidBox, SolidHull, pack
 from roller_env.physics.rigid.states import (
     FORCE,
     ORIENTATION,
@@ -30,6 +30,7 @@ from roller_env.physics.rigid.states import (
 )
 from roller_env.physics.rigid.step import advance
 from roller_env.physics.rigid.workspace import make_workspace
+from roller_env.pieces.convex import ConvexSolid
 from roller_env.pieces.piece import UPWARDS, Solid
 
 CAP_S = 1 / 120
@@ -64,23 +65,20 @@ def rigid_level(
     along = np.tile(UPWARDS, (len(stops), 1))
     along[list(numbers)] = np.array([mover.along for mover in expanded.movers]).reshape(-1, 3)
 
-    def box(solid: Solid, slab: int = STATIC) -> SolidBox:
+    def rigid(solid: Solid, slab: int = STATIC) -> SolidBox | SolidHull:
         material = level.material(solid.material)
-        return SolidBox(
-            centre=solid.centre,
-            half_size=solid.half_size,
-            rotation=solid.rotation,
-            friction=level.ball.friction * material.friction,
-            elasticity=level.ball.elasticity * material.elasticity,
-            slab=slab,
-        )
+        friction = level.ball.friction * material.friction
+        elasticity = level.ball.elasticity * material.elasticity
+        if isinstance(solid, ConvexSolid):
+            return SolidHull(solid.corners().tolist(), friction, elasticity, slab)
+        return SolidBox(solid.centre, solid.half_size, solid.rotation, friction, elasticity, slab)
 
     return RigidLevel(
         solids=[
-            *map(box, merge_solids(expanded.ground)),
-            *map(box, expanded.machines),
+            *map(rigid, merge_solids(expanded.ground)),
+            *map(rigid, expanded.machines),
             *(
-                box(mover.solid, number)
+                rigid(mover.solid, number)
                 for number, mover in zip(numbers, expanded.movers, strict=True)
             ),
         ],

@@ -25,7 +25,7 @@ from roller_env.level.schema import Level, Material
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.pieces.look import METAL, Fly, Paint, Shape, part
 from roller_env.pieces.piece import Solid
-from roller_env.pieces.surfaces import Surface, box_surfaces
+from roller_env.pieces.surfaces import Surface, solid_surfaces
 
 _HIDDEN_GROUP: Final = 4
 """Geoms of the physics that a surface is drawn for; MuJoCo leaves this group out by default."""
@@ -128,7 +128,7 @@ def _add_ground(spec: mujoco.MjSpec, level: Level) -> None:
     for name, pieces in by_material.items():
         material = level.material(name)
         _add_level_material(spec, name, material)
-        faces, edges = zip(*map(box_surfaces, pieces), strict=True)
+        faces, edges = zip(*map(solid_surfaces, pieces), strict=True)
         _add_surface(spec, part("ground") + name, faces, name)
         edges = tuple(edge for edge in edges if edge is not None)
         if edges:

@@ -72,10 +72,7 @@ def render_overview(level: Level, width: int, height: int, view: View | None = N
 def level_corners(level: Level) -> Float64:
     """Return the corners of all that there is to see, (n, 3) metres."""
     signs = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-    corners = [
-        signs * solid.half_size @ np.array(solid.rotation).T + solid.centre
-        for solid in expand(level).at_the_start
-    ]
+    corners = [solid.corners() for solid in expand(level).at_the_start]
     # The arch stands about twice as high as the finish itself.
     corners += [signs * np.array(level.finish.size) * [0.5, 0.5, 1.5] + level.finish.at]
     return np.concatenate([*corners, [level.start.at]])

@@ -51,6 +51,8 @@ class GameRenderer:
         """Make a renderer of pictures of ``width`` by ``height`` pixels."""
         self._simulation = simulation
         self._size = (width, height)
+        self._slots = simulation.table.slots(simulation.levels)
+        self._level = 0
         self._stage: Stage | None = None
         self._canvas: Canvas | None = None
 
@@ -72,8 +74,9 @@ class GameRenderer:
             return self._draw(row, camera)
 
     def _draw(self, row: int, camera: int | Literal["game"]) -> Picture:
-        stage, canvas = self._open()
         simulation = self._simulation
+        level = int(simulation.level_of[row])
+        stage, canvas = self._open(level)
         state = simulation.state
         game_mode = int(state.camera.mode[row])
         mode = game_mode if camera == "game" else int(camera)
@@ -81,7 +84,9 @@ class GameRenderer:
             # Nothing retreats: this is where the camera is when it has.
             mode = MODE_BEHIND
         ball = simulation.ball_position[row : row + 1]
-        stage.show(simulation.qpos[row], state, row, float(simulation.time_s[row]))
+        # The stage has the level's own slabs, the simulation those of all levels.
+        own = [*range(7), *(7 + slot for slot in self._slots[level])]
+        stage.show(simulation.qpos[row, own], state, row, float(simulation.time_s[row]))
         stage.clear_view(mode)
         stage.light_from(ball[0])
         modes = np.array([mode])
@@ -95,9 +100,13 @@ class GameRenderer:
             self._canvas.close()
         self._canvas = self._stage = None
 
-    def _open(self) -> tuple[Stage, Canvas]:
+    def _open(self, level: int) -> tuple[Stage, Canvas]:
+        """Return the stage of a level, and what it is drawn on."""
+        if level != self._level:
+            self.close()
         if self._canvas is None or self._stage is None:
-            stage = Stage(self._simulation.level, self._simulation.preset)
+            self._level = level
+            stage = Stage(self._simulation.levels[level], self._simulation.preset)
             visual, small = stage.model.vis, min(self._size) < SMALL_PICTURE_PIXELS
             visual.global_.fovy = FIELD_OF_VIEW_DEG
             visual.map.shadowclip = SHADOW_REACH_SMALL_M if small else SHADOW_REACH_M

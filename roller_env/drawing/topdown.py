@@ -58,7 +58,7 @@ class _Storey:
     @property
     def limits(self) -> tuple[Float64, Float64]:
         """Lowest and highest (x, y) of its boxes."""
-        corners = np.concatenate([_corners(box) for box, _ in self.boxes])[:, :2]
+        corners = np.concatenate([box.corners() for box, _ in self.boxes])[:, :2]
         return corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
 
 
@@ -192,19 +192,13 @@ def _draw_boxes(
     sign = 1.0 if eye == 2 else -1.0
     faces: list[tuple[float, Float64, Colour]] = []
     for box, colour in boxes:
-        corners = _corners(box)
-        rotation = np.array(box.rotation)
-        for axis in range(3):
-            for side in (0, 1):
-                facing = sign * rotation[eye, axis] * (2 * side - 1)
-                if facing > 1e-6:
-                    face = corners[_FACES[axis][side]]
-                    shade = 0.55 + 0.45 * float(facing)
-                    red, green, blue = (
-                        shade * (_PALE + (1.0 - _PALE) * part) for part in colour[:3]
-                    )
-                    lit = (red, green, blue, colour[3])
-                    faces.append((float(sign * face[:, eye].max()), face[:, [right, up]], lit))
+        for normal, corners in box.faces():
+            facing = sign * float(normal[eye])
+            if facing > 1e-6:
+                shade = 0.55 + 0.45 * facing
+                red, green, blue = (shade * (_PALE + (1.0 - _PALE) * part) for part in colour[:3])
+                lit = (red, green, blue, colour[3])
+                faces.append((float(sign * corners[:, eye].max()), corners[:, [right, up]], lit))
     faces.sort(key=lambda face: face[0])
     axes.add_collection(
         PolyCollection(
@@ -307,23 +301,8 @@ def _legend(outcomes: Sequence[str]) -> list[Line2D]:
     return handles
 
 
-_SIGNS: Final = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-# Round the face, not across it.
-_FACES: Final = [
-    [np.flatnonzero(_SIGNS[:, axis] == sign)[[0, 1, 3, 2]] for sign in (-1.0, 1.0)]
-    for axis in range(3)
-]
-"""Indices of a box's `_corners` round its faces, by axis and side."""
-
-
-def _corners(box: Solid) -> Float64:
-    """Return a box's corners, (8, 3) metres."""
-    corners: Float64 = (_SIGNS * box.half_size) @ np.array(box.rotation).T + box.centre
-    return corners
-
-
 def _span(box: Solid) -> tuple[float, float]:
-    heights = _corners(box)[:, 2]
+    heights = box.corners()[:, 2]
     return float(heights.min()), float(heights.max())
 
 

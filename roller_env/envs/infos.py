@@ -36,6 +36,8 @@ def single_info(simulation: Simulation) -> dict[str, Any]:
         "fall": result.fall,
         "diverged": result.diverged,
     }
+    if len(simulation.levels) > 1:
+        info[LEVEL] = int(simulation.level_of[0])
     if result.outcome != "not ended":
         info[TERMS] = result.reward_terms
     return info

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
@@ -9,11 +10,11 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
 from roller_env.arrays import UInt8
-from roller_env.config import EnvConfig, make_config
+from roller_env.config import EnvConfig, LevelSource, make_config
 from roller_env.envs import spaces
 from roller_env.envs.arguments import reset_of, seed_of
 from roller_env.envs.infos import single_info
-from roller_env.envs.specs import plain_spec
+from roller_env.envs.specs import plain_options, plain_spec
 from roller_env.game.actions import forces
 from roller_env.simulation import Simulation, Snapshot
 
@@ -43,17 +44,22 @@ class RollerEnv(gym.Env[Any, Any]):
     # Gymnasium reads the class's before an environment is made, and writes none.
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012
 
-    def __init__(self, **options: Any):
+    def __init__(self, *, levels: Sequence[LevelSource] | None = None, **options: Any):
         """Make the environment; see `roller_env.config.EnvConfig` for the options.
+
+        Args:
+            levels: instead of the option ``level``: every reset draws one of them, and
+                ``info["level"]`` says which; only with ``physics="rigid"`` or ``"relaxed"``.
+            options: of the environment.
 
         Raises:
             TypeError: there is no option of that name.
             ValueError: an option's value is not allowed.
-            LevelError: the level is not valid.
+            LevelError: a level is not valid.
         """
         self.config: EnvConfig = make_config(**{"num_threads": 1, **options})
         self._spec: EnvSpec | None = None
-        self.simulation = Simulation(self.config, num_envs=1)
+        self.simulation = Simulation(self.config, 1, levels)
         self.action_space = spaces.action_space(self.config)
         self.observation_space = spaces.observation_space(self.config, self.simulation.entries)
         self.render_mode = self.config.render_mode
@@ -68,7 +74,7 @@ class RollerEnv(gym.Env[Any, Any]):
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = plain_spec(spec, self.config.to_json())
+        self._spec = plain_spec(spec, plain_options(self.simulation))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -19,7 +19,7 @@ from roller_env.config import EnvConfig, LevelSource, make_config
 from roller_env.envs import spaces
 from roller_env.envs.arguments import reset_of, seeds_of
 from roller_env.envs.infos import vector_info
-from roller_env.envs.specs import plain_spec
+from roller_env.envs.specs import plain_options, plain_spec
 from roller_env.game.actions import forces
 from roller_env.simulation import Simulation, Snapshot
 
@@ -89,12 +89,7 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        plain = {**self.config.to_json(), "autoreset_mode": self.autoreset_mode.name}
-        if len(self.simulation.levels) > 1:
-            plain["levels"] = [
-                level.model_dump(mode="json", exclude_defaults=True)
-                for level in self.simulation.levels
-            ]
+        plain = {**plain_options(self.simulation), "autoreset_mode": self.autoreset_mode.name}
         self._spec = plain_spec(spec, plain)
 
     @property  # type: ignore[misc]

@@ -48,24 +48,27 @@ def _chain(hooks: list[Hook]) -> AllHooks:
     chain: AllHooks | None = None
     for number in reversed(range(len(hooks))):
         if hooks[number] is not nothing:
-            only = _only(inlined(hooks[number]), number)
+            only = _only(inlined(hooks[number]), number, RULES[number].is_basic)
             chain = only if chain is None else _both(only, chain)
     assert chain is not None, "every hook has a kind that has to do with it"
     return chain
 
 
-def _only(hook: Hook, number: int) -> AllHooks:
+def _only(hook: Hook, number: int, always: bool) -> AllHooks:
+    """Return a function that calls one kind's hook: always, or where a level has such pieces."""
+
     @spliced
     def call(now: Any, tables: tuple[Any, ...], states: tuple[Any, ...], owns: Int64) -> None:
-        own = Own(
-            owns[number, 0],
-            owns[number, 1],
-            owns[number, 2],
-            owns[number, 3],
-            owns[number, 4],
-            owns[number, 5],
-        )
-        hook(now, tables[number], states[number], own)
+        if always or owns[number, 1] + owns[number, 3] > 0:
+            own = Own(
+                owns[number, 0],
+                owns[number, 1],
+                owns[number, 2],
+                owns[number, 3],
+                owns[number, 4],
+                owns[number, 5],
+            )
+            hook(now, tables[number], states[number], own)
 
     return call
 

@@ -10,6 +10,7 @@ REWARD_TERMS: Final = ("coin", "finish", "fall", "progress")
 """What a step is rewarded for, in the order in which the terms are added up: the fields of
 `roller_env.game.rewards.RewardWeights`."""
 
+Medal = Literal["gold", "silver", "bronze"]
 Outcome = Literal["finish", "fall", "diverged", "time limit", "not ended"]
 
 
@@ -50,3 +51,15 @@ class EpisodeResult:
         if self.diverged:
             return "diverged"
         return "time limit" if self.truncated else "not ended"
+
+    def medal(self, par_time_s: float | None) -> Medal | None:
+        """Return what the game is worth beside a level's par time, None if nothing.
+
+        Gold is the finish with every coin within the par time, silver with one of both, bronze the
+        finish. A level without a par time has no medals.
+        """
+        if par_time_s is None or not self.success:
+            return None
+        met = (self.score_percent == 100.0) + (self.time_s <= par_time_s)
+        medals: tuple[Medal, Medal, Medal] = ("bronze", "silver", "gold")
+        return medals[met]

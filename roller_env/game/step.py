@@ -156,8 +156,6 @@ class Concluding(NamedTuple):
         hanging_s: (N,) from `prepare`.
         votes: (N, S) how many of the sources of each receiver are on.
         back_at: (N, 3) where a ball that has fallen is put.
-        thrown: (N, 1) whether a piece has put the ball elsewhere or thrown it.
-        motion: (N, 6) its place and velocity then.
         step: written.
     """
 
@@ -174,8 +172,6 @@ class Concluding(NamedTuple):
     hanging_s: Float64
     votes: Int64
     back_at: Float64
-    thrown: Bool
-    motion: Float64
     step: Step
 
 
@@ -263,8 +259,6 @@ class Games:
             self.hanging_s,
             np.zeros((num_envs, levels.signals), dtype=np.int64),
             np.zeros((num_envs, 3)),
-            flags(1),
-            np.zeros((num_envs, 6)),
             self.step,
         )
         self.showing = Showing(
@@ -373,12 +367,8 @@ def conclude(
         step.camera.trigger[env] = -1
         step.camera.overhead[env] = False
         step.camera.behind[env] = returns
-        motion = games.motion[env]
-        games.thrown[env, 0] = False
         for axis in range(3):
             games.back_at[env, axis] = games.start[level, axis]
-            motion[axis] = physics[env, at.position + axis]
-            motion[3 + axis] = physics[env, at.velocity + axis]
         for signal in range(games.votes.shape[1]):
             games.votes[env, signal] = 0
         now = After(
@@ -396,27 +386,19 @@ def conclude(
             step.camera,
             returns,
             games.back_at[env],
-            games.thrown[env],
-            motion[:3],
-            motion[3:],
+            physics[env, at.position : at.position + 3],
+            physics[env, at.velocity : at.velocity + 3],
         )
         _react(now, games.tables, state.kinds, games.owns)
         settle(env, duration_s, way[-1, 0], step.camera, state.camera)
         over = state.finished[env] or state.fallen[env] or state.diverged[env]
-        thrown = games.thrown[env, 0] and not over and not returns
         for region in range(state.touching.shape[1]):
             state.touching[env, region] = step.inside[env, region] and not returns
         state.truncated[env] = not over and state.steps[env] >= games.max_steps[env]
         if returns:
             _put_back(physics[env], at, games.back_at[env])
-            _pay(games, level, env, games.back_at[env], over, rewarding)
-        elif thrown:
-            for axis in range(3):
-                physics[env, at.position + axis] = motion[axis]
-                physics[env, at.velocity + axis] = motion[3 + axis]
-            _pay(games, level, env, motion[:3], over, rewarding)
-        else:
-            _pay(games, level, env, way[-1], over, rewarding)
+        place = physics[env, at.position : at.position + 3]
+        _pay(games, level, env, place, over, rewarding)
 
 
 @inlined

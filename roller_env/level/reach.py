@@ -20,11 +20,12 @@ from roller_env.arrays import Bool, Float64
 from roller_env.level.expand import expand
 from roller_env.level.schema import Level
 from roller_env.pieces.coin import COIN_REACH_M
+from roller_env.pieces.convex import ConvexSolid
 from roller_env.pieces.finish import Finish
 from roller_env.pieces.lift_pad import LiftPad, pad_groups
 from roller_env.pieces.piece import Region, Solid
 from roller_env.pieces.plate import Plate
-from roller_env.pieces.spans import EDGE, SLOPE, Indices, Spans, free_spans
+from roller_env.pieces.spans import EDGE, FLAT, SLOPE, Indices, Spans, free_spans
 
 _CLIMB: Final = 0.9
 """How far, in radii, the ball's centre may rise from one column to the next while it rolls: that of
@@ -269,9 +270,14 @@ class _Flood:
         return _Boxes(self._spans, low, high)
 
     def landings(self, motion: _Motion, solids: Sequence[Solid]) -> dict[str, Landing]:
-        """Return the deepest fall onto each solid that has been reached."""
+        """Return the deepest fall onto each solid that has been reached.
+
+        Of a hull only the level face counts, and it as nowhere thinner than the hull is high.
+        """
         spans = self._spans
-        on = np.flatnonzero((self.away == 0) & (spans.kind != EDGE))
+        is_hull = np.array([isinstance(solid, ConvexSolid) for solid in solids], dtype=bool)
+        onto_face = np.where(is_hull[spans.solid], spans.kind == FLAT, spans.kind != EDGE)
+        on = np.flatnonzero((self.away == 0) & onto_face)
         drops = np.minimum(spans.ceiling[on], motion.rests) - spans.floor[on]
         # The deepest fall onto each solid, and where it is thinnest of those.
         order = np.lexsort((spans.under[on], -drops))
@@ -281,6 +287,8 @@ class _Flood:
             solid, radius = solids[number], self._level.ball.radius
             steepness = float(np.abs(solid.rotation[2]).max())
             across = steepness * (float(spans.under[on[index]]) + 2.0 * radius) - 2.0 * radius
+            if is_hull[number]:
+                across = max(across, 2.0 * solid.half_size[2])
             landing = Landing(float(drops[index]), steepness, across)
             if solid.source not in found or landing.drop > found[solid.source].drop:
                 found[solid.source] = landing

@@ -41,6 +41,7 @@ from roller_env.pieces.floor import FloorPlan
 from roller_env.pieces.gate import Gate
 from roller_env.pieces.ground import Ground
 from roller_env.pieces.hazard import Hazard
+from roller_env.pieces.hull import Hull, Wedge
 from roller_env.pieces.lift_pad import LiftPad
 from roller_env.pieces.piece import Piece, Solid
 from roller_env.pieces.plate import Plate
@@ -140,6 +141,9 @@ class Level(Part):
         "`checkpoint` that it touched.",
     )
     time_limit_s: Seconds = Field(120.0, description="An episode ends after this long.")
+    par_time_s: Seconds | None = Field(
+        None, description="Time in which a good player collects all coins and finishes."
+    )
     ball: Ball = Ball()
     start: Start
     finish: Finish
@@ -152,6 +156,8 @@ class Level(Part):
     boxes: tuple[Box, ...] = ()
     ramps: tuple[Ramp, ...] = ()
     walls: tuple[Wall, ...] = ()
+    hulls: tuple[Hull, ...] = ()
+    wedges: tuple[Wedge, ...] = ()
     tubes: tuple[Tube, ...] = ()
     plates: tuple[Plate, ...] = ()
     switches: tuple[Switch, ...] = ()

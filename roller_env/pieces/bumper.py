@@ -106,7 +106,6 @@ def _react(now: After, table: BumperTable, state: None, own: Own) -> None:
                 x, y = x / away, y / away
                 speed = table.speed[now.level, bumper]
                 gain = max(speed - x * now.velocity[0] - y * now.velocity[1], 0.0)
-                now.thrown[0] = True
                 now.velocity[0] += gain * x
                 now.velocity[1] += gain * y
 

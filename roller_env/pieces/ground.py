@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.arrays import Float64
+from roller_env.pieces.convex import ConvexSolid
 from roller_env.pieces.piece import Piece, Solid
 from roller_env.units import METRES_PER_QUANT, quants
 
@@ -55,7 +56,10 @@ class Ground:
 
 
 class _Faces(NamedTuple):
-    """The upper faces of n solids: arrays that begin with n, but for the first two, (2, n)."""
+    """The upper faces of n boxes, and of other solids.
+
+    Arrays that begin with n, but for the first two, (2, n).
+    """
 
     middle: Float64
     beside: Float64
@@ -63,19 +67,27 @@ class _Faces(NamedTuple):
     centre: Float64
     rotation: Float64
     half: Float64
+    others: list[ConvexSolid]
 
     @staticmethod
     def of(solids: Sequence[Solid]) -> _Faces:
+        others = [solid for solid in solids if isinstance(solid, ConvexSolid)]
+        solids = [solid for solid in solids if not isinstance(solid, ConvexSolid)]
         centre = np.array([solid.centre for solid in solids]).reshape(-1, 3)
         rotation = np.array([solid.rotation for solid in solids]).reshape(-1, 3, 3)
         half = np.array([solid.half_size for solid in solids]).reshape(-1, 3)
         reach = np.einsum("nij,nj->ni", np.abs(rotation), half)
         aligned = np.array([solid.axis_aligned for solid in solids], dtype=bool)
         middle, beside = (np.ascontiguousarray(array.T[:2]) for array in (centre, reach))
-        return _Faces(middle, beside, aligned, centre, rotation, half)
+        return _Faces(middle, beside, aligned, centre, rotation, half, others)
 
     def over(self, place: Float64) -> Float64:
         """Return how high those at a place (x, y) are, metres."""
+        ends = [solid.upright(place) for solid in self.others]
+        tops = [float(top) for bottom, top in ends if bottom <= top]
+        return np.append(self._over_boxes(place), tops)
+
+    def _over_boxes(self, place: Float64) -> Float64:
         x, y = np.abs(place[:, None] - self.middle) <= self.beside
         near = x & y
         level, tilted = near & self.aligned, near & ~self.aligned

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -33,9 +34,32 @@ UPWARDS: Final[Vector] = (0.0, 0.0, 1.0)
 UNTURNED: Final[Matrix] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
+_SIGNS: Final = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+# Round the face, not across it.
+_ROUND: Final = [
+    [np.flatnonzero(_SIGNS[:, axis] == sign)[[0, 1, 3, 2]] for sign in (-1.0, 1.0)]
+    for axis in range(3)
+]
+"""Indices of a box's corners round its faces, by axis and side."""
+
+
+class Face(NamedTuple):
+    """A face of a solid.
+
+    Attributes:
+        normal: (3,) unit vector, out of the solid, world frame.
+        corners: (n, 3) metres, world frame, one after the other round it.
+    """
+
+    normal: Float64
+    corners: Float64
+
+
 @dataclass(frozen=True, slots=True)
 class Solid:
     """A box that stands still.
+
+    `roller_env.pieces.convex.ConvexSolid` is one of another shape.
 
     Attributes:
         centre: world frame, metres.
@@ -66,6 +90,18 @@ class Solid:
         outside = np.maximum(np.abs(local) - half, 0.0)
         inside: npt.NDArray[np.bool_] = (outside**2).sum(axis=-1) <= max(margin, 0.0) ** 2
         return inside
+
+    def corners(self) -> Float64:
+        """Return its corners, (n, 3) metres, world frame."""
+        corners: Float64 = (_SIGNS * self.half_size) @ np.array(self.rotation).T + self.centre
+        return corners
+
+    def faces(self) -> Iterator[Face]:
+        """Yield its faces."""
+        corners, rotation = self.corners(), np.array(self.rotation)
+        for axis in range(3):
+            for side, sign in enumerate((-1.0, 1.0)):
+                yield Face(sign * rotation[:, axis], corners[_ROUND[axis][side]])
 
 
 @dataclass(frozen=True, slots=True)

@@ -129,9 +129,8 @@ class After(NamedTuple):
         camera: what the pieces ask of it.
         returns: whether the ball has fallen and is put back at the end of the step.
         back_at: (3,) to set: where its centre is put then; the level's start so far. Metres.
-        thrown: (1,) to set: whether the ball's place or velocity is another one.
-        place: (3,) to set, with ``thrown``: the ball's centre, metres, world frame.
-        velocity: (3,) to set, with ``thrown``: m/s, world frame.
+        place: (3,) to set: where the ball's centre goes on, metres, world frame.
+        velocity: (3,) to set: with what velocity, m/s, world frame.
     """
 
     level: int
@@ -148,7 +147,6 @@ class After(NamedTuple):
     camera: CameraAsked
     returns: bool
     back_at: Float64
-    thrown: Bool
     place: Float64
     velocity: Float64
 

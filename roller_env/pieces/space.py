@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.arrays import Bool, Float64
+from roller_env.pieces.convex import ConvexSolid
 from roller_env.pieces.piece import TOUCHING_M, Solid
 
 Indices = npt.NDArray[np.intp]
@@ -124,6 +125,11 @@ def held_up(blocks: Sequence[Solid], places: Float64, radius: float, lowest: flo
 
 def _stands_over(solid: Solid, feet: Float64, lowest: float) -> Bool:
     """Say from which points, (..., 3), the way straight down to ``lowest`` meets a solid."""
+    over: Bool
+    if isinstance(solid, ConvexSolid):
+        bottom, top = solid.upright(feet[..., :2])
+        over = np.maximum(bottom, lowest) <= np.minimum(top, feet[..., 2])
+        return over
     rotation, half = np.array(solid.rotation), np.array(solid.half_size)
     local = (feet - np.array(solid.centre)) @ rotation
     down = -rotation[2]
@@ -135,7 +141,7 @@ def _stands_over(solid: Solid, feet: Float64, lowest: float) -> Bool:
         ends = (np.array([-half[axis], half[axis]]) - local[..., [axis]]) / down[axis]
         enter = np.maximum(enter, ends.min(axis=-1))
         leave = np.minimum(leave, ends.max(axis=-1))
-    over: Bool = enter <= leave
+    over = enter <= leave
     return over
 
 

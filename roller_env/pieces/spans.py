@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from roller_env.arrays import Bool, Float64
+from roller_env.pieces.convex import ConvexSolid
 from roller_env.pieces.piece import Solid
 
 Indices = npt.NDArray[np.intp]
@@ -141,6 +142,10 @@ def _met(
     xs, ys = np.meshgrid(*(np.arange(begin[k], end[k] + 1) for k in (0, 1)), indexing="ij")
     places = np.stack([xs.ravel(), ys.ravel()], axis=1) * cell + low - centre[:2]
     columns = (xs * shape[1] + ys).ravel()
+    if isinstance(solid, ConvexSolid):
+        bottoms, tops, kind = _met_convex(solid, places + centre[:2], radius)
+        hit = tops > bottoms
+        return columns[hit], bottoms[hit], tops[hit], kind[hit]
     if abs(rotation[2, 2]) > 1.0 - 1e-9:
         outside = np.maximum(np.abs(places @ rotation[:2, :2]) - half[:2], 0.0)
         away = (outside**2).sum(axis=1)
@@ -163,6 +168,29 @@ def _met(
         bottoms[lower] = bottom[lower]
     hit = tops > bottoms
     return columns[hit], centre[2] + bottoms[hit], centre[2] + tops[hit], kind[hit]
+
+
+def _met_convex(
+    solid: ConvexSolid, places: Float64, radius: float
+) -> tuple[Float64, Float64, npt.NDArray[np.int8]]:
+    """Return from where to where a ball meets a solid over places, (n, 2) metres, and its kind.
+
+    The solid and a ball's radius around it hold the solid moved by that along each of its normals.
+    What they hold besides, round its edges, is left out, as it is of tilted boxes.
+    """
+    bottoms, tops = solid.upright(places)
+    kind = np.full(len(places), EDGE, dtype=np.int8)
+    for side in solid.sides:
+        normal = np.array(side.normal)
+        bottom, top = np.array(solid.upright(places - radius * normal[:2])) + radius * normal[2]
+        higher = top > tops + 1e-9
+        kind[higher] = EDGE
+        if normal[2] > 1e-9:
+            beyond = places @ normal[:2] + top * normal[2] - side.offset
+            on_face = higher & (beyond > radius - 1e-9)
+            kind[on_face] = FLAT if normal[2] > 1.0 - 1e-9 else SLOPE
+        tops, bottoms = np.maximum(tops, top), np.minimum(bottoms, bottom)
+    return bottoms, tops, kind
 
 
 def _cut(places: Float64, rotation: Float64, half: Float64) -> tuple[Float64, Float64]:

@@ -102,7 +102,6 @@ def _react(now: After, table: SpringTable, state: None, own: Own) -> None:
     """Throw the ball from each spring that was entered."""
     for spring in range(own.regions):
         if now.entry[own.region + spring] < np.inf:
-            now.thrown[0] = True
             direction = table.direction[now.level, spring]
             gain = table.speed[now.level, spring]
             for axis in range(3):

@@ -1,4 +1,4 @@
-"""Triangle surfaces for pictures: boxes with texture in world scale, and bodies of revolution.
+"""Triangle surfaces for pictures: solids with texture in world scale, and bodies of revolution.
 
 The physics makes do with MuJoCo's primitives. Pictures do not: a texture on a primitive starts
 anew on each one, so a floor of several boxes would show its seams.
@@ -15,7 +15,8 @@ from typing import Final
 import numpy as np
 
 from roller_env.arrays import Float64, Int64
-from roller_env.pieces.piece import Solid
+from roller_env.pieces.convex import ConvexSolid
+from roller_env.pieces.piece import Face, Solid
 from roller_env.units import quants
 
 TILE_M: Final = quants(64.0)
@@ -58,6 +59,31 @@ class Surface:
             self.texture,
             self.faces,
         )
+
+
+def solid_surfaces(solid: Solid) -> tuple[Surface, Surface | None]:
+    """Return a solid's faces, and apart from them its edge if it is a box that is a slab."""
+    if isinstance(solid, ConvexSolid):
+        return Surface.joined([_flat_face(face) for face in solid.faces()]), None
+    return box_surfaces(solid)
+
+
+def _flat_face(face: Face) -> Surface:
+    """Return a face of a convex solid.
+
+    The texture of one that looks along an axis of the world goes on unbroken from that of the
+    boxes beside it.
+    """
+    count = len(face.corners)
+    right, up = ((1, 2), (0, 2), (0, 1))[int(np.abs(face.normal).argmax())]
+    along = np.eye(3)[right] - face.normal[right] * face.normal
+    along /= np.linalg.norm(along)
+    across = np.cross(face.normal, along)
+    across *= math.copysign(1.0, across[up])
+    texture = np.stack([face.corners @ along, face.corners @ across], axis=1) / TILE_M
+    second = np.arange(1, count - 1)
+    fan = np.stack([np.zeros_like(second), second, second + 1], axis=1)
+    return Surface(face.corners, np.tile(face.normal, (count, 1)), texture, fan)
 
 
 def box_surfaces(solid: Solid) -> tuple[Surface, Surface | None]:

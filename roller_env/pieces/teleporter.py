@@ -107,7 +107,6 @@ def _react(now: After, table: TeleporterTable, state: None, own: Own) -> None:
         entry = now.entry[own.region + teleporter]
         if entry < first:
             first = entry
-            now.thrown[0] = True
             for axis in range(3):
                 now.place[axis] = table.to[now.level, teleporter, axis]
 

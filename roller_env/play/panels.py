@@ -176,7 +176,7 @@ def build_end_gui(frame: GameFrame, following: Choice | None) -> Wish | None:
     with panel("end", pivot=(0.5, 0.5), pad=28.0):
         title, colour = _END_TITLES.get(result.outcome, (result.outcome, _WHITE))
         _text(title, _TITLE_SIZE, colour)
-        _rows(end_rows(result, frame.coins_in_level))
+        _rows(end_rows(result, frame.coins_in_level, frame.level.par_time_s))
         imgui.Dummy(imgui.Vec2(0.0, 8.0))
         ahead = result.success and following is not None
         if _button("Play again", lit=not ahead, height=44.0) or (not ahead and _enter()):
@@ -188,14 +188,17 @@ def build_end_gui(frame: GameFrame, following: Choice | None) -> Wish | None:
     return wish
 
 
-def end_rows(result: EpisodeResult, coins_in_level: int) -> Rows:
+def end_rows(result: EpisodeResult, coins_in_level: int, par_time_s: float | None = None) -> Rows:
     """Return what the end panel tells of a game: names and values."""
     points, all_points = COIN_ON_PANELS * result.coins, COIN_ON_PANELS * coins_in_level
+    par = "" if par_time_s is None else f", par {par_time_s:g} s"
+    medal = result.medal(par_time_s)
     return (
         ("Points", f"{points} of {all_points}"),
         ("Coins", f"{result.coins} of {coins_in_level}"),
         ("Score", f"{result.score_percent:.0f} %"),
-        ("Time", f"{result.time_s:.1f} s"),
+        ("Time", f"{result.time_s:.1f} s{par}"),
+        *((("Medal", medal),) if medal is not None else ()),
     )
 
 

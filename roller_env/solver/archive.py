@@ -20,6 +20,9 @@ from roller_env.simulation import Simulation, Snapshot
 CELL_M: Final = 1.0
 """Edge of a cell."""
 
+PHASE_S: Final = 1.0
+"""Part of a platform's timetable that counts as one."""
+
 MOST_CELLS: Final = 60_000
 """Beyond so many a third is forgotten: those with the fewest coins."""
 
@@ -152,8 +155,25 @@ def cells(simulation: Simulation) -> Int64:
     left = np.where(simulation.coins_in_level - state.coins <= _FEW_LEFT, 1, 0)
     which = left * (taken @ (1 + np.arange(taken.shape[1])) ** 2)
     done = np.stack([state.coins, state.achieved.sum(axis=1), which], axis=1)
-    # Where a platform is when one comes somewhere says whether one can go on.
-    own = simulation.table.own(PLATFORM)
-    moved = simulation.qpos[:, 7 + own.mover : 7 + own.mover + own.movers]
-    parts = (place, done, state.signals, np.floor(moved / CELL_M).astype(np.int64))
+    parts = (place, done, state.signals, _platforms(simulation))
     return np.ascontiguousarray(np.concatenate(parts, axis=1))
+
+
+def _platforms(simulation: Simulation) -> Int64:
+    """Return (N, 0 or 2) which platform is the nearest, and where in its timetable that is.
+
+    Who comes somewhere first may have to wait there: the same place is another cell then.
+    """
+    table, movers = simulation.table.of(PLATFORM), simulation.table.movers
+    own = simulation.table.own(PLATFORM)
+    if not own.movers:
+        return np.zeros((simulation.num_envs, 0), dtype=np.int64)
+    mine = slice(own.mover, own.mover + own.movers)
+    start, along = movers.centre[0, mine], movers.along[0, mine]
+    from_start = simulation.ball_position[:, None] - start
+    nearest = np.clip((from_start * along).sum(axis=2), movers.stop[0, mine], 0.0)
+    apart = np.linalg.norm(from_start - nearest[..., None] * along, axis=2)
+    which = apart.argmin(axis=1)
+    period_s = 2.0 * (table.way[0] / table.speed[0] + table.wait_s[0])[which]
+    clock_s = simulation.state.of(PLATFORM).clock_s[np.arange(len(which)), which]
+    return np.stack([which, (clock_s % period_s / PHASE_S).astype(np.int64)], axis=1)

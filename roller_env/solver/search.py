@@ -73,7 +73,7 @@ def solver_config(level: Level | str, physics: str = "rigid") -> EnvConfig:
 
 
 class Search:
-    """Plays a level on the rigid engine until it is found how it is won.
+    """Plays a level until it is found how it is won.
 
     Attributes:
         archive: what was reached.
@@ -81,9 +81,9 @@ class Search:
         steps: environment steps played.
     """
 
-    def __init__(self, level: Level | str, seed: int = 0):
+    def __init__(self, level: Level | str, seed: int = 0, physics: str = "rigid"):
         """Begin at the level's start, whose jitter ``seed`` decides as in `RollerEnv.reset`."""
-        self.config, self.seed = solver_config(level), seed
+        self.config, self.seed = solver_config(level, physics), seed
         self._simulation = Simulation(self.config, GAMES)
         self._rng = np.random.default_rng([seed, 1])
         self._simulation.seed([seeding.np_random(seed)[0] for _ in range(GAMES)])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -18,9 +19,11 @@ from hypothesis import given, settings
 from roller_env.compile.compiled import CompiledLevel, compile_level, level_mjcf
 from roller_env.compile.mjcf import BALL, FORCE_ACTUATORS
 from roller_env.level import Level, load_level, shipped_levels
+from roller_env.level.expand import expand
 from roller_env.physics.presets import PRESETS
+from roller_env.pieces.convex import ConvexSolid
 from roller_env.pieces.gate import LOWERS_TO_M
-from tests.builders import BALL_RADIUS_M, make_level, make_world, q, resting
+from tests.builders import BALL_RADIUS_M, GROUND, make_level, make_world, q, resting
 from tests.strategies import levels
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -102,12 +105,12 @@ def test_the_compiled_model_steps_like_any_mujoco_model(compiled: CompiledLevel)
 
 
 @pytest.mark.parametrize("name", shipped_levels())
-def test_there_is_one_joint_and_one_actuator_for_each_plate_and_gate_and_no_other(
+def test_there_is_one_joint_and_one_actuator_for_each_thing_that_moves_and_no_other(
     name: str,
 ) -> None:
     level = load_level(name)
     model = compile_level(level).model
-    movers = [plate.name for plate in level.plates] + [gate.name for gate in level.gates]
+    movers = [piece.name for piece in (*level.plates, *level.gates, *level.platforms)]
     assert names(model, "joint") == [BALL, *movers]
     assert names(model, "actuator") == [*FORCE_ACTUATORS, *movers]
     slides = [model.joint(mover).type[0] for mover in movers]
@@ -171,6 +174,63 @@ def test_the_keys_forces_act_along_the_worlds_axes_while_the_ball_spins() -> Non
         expected = 2.0 * np.eye(3)[axis]
         np.testing.assert_allclose(world.velocity[0], expected, atol=2e-3)
         np.testing.assert_allclose(world.spin[0], [3.0, -7.0, 11.0], atol=1e-9)
+
+
+# Hulls --------------------------------------------------------------------------------------------
+
+ROCK = [(300.0, 0.0, 0.0), (310.0, 0.0, 0.0), (300.0, 12.0, 0.0), (310.0, 12.0, 1.0), (302, 3, 4)]
+HULLS: dict[str, Any] = {
+    "hulls": [{"points": [*ROCK, (303.0, 4.0, 1.0)], "material": "ice"}],
+    "wedges": [{"at": (20.0, 0.0, 1.0), "size": (4.0, 3.0, 2.0), "yaw_deg": 30.0}],
+    "boxes": [GROUND, {"at": (9.0, 0.0, 0.5), "size": (1.0, 1.0, 1.0), "material": "ice"}],
+    "materials": {"ice": {"friction": 0.1, "elasticity": 0.5}},
+}
+
+
+def vertices(model: mujoco.MjModel, geom: int) -> np.ndarray:
+    """Return where the vertices of a geom's mesh are in the world, (n, 3) metres."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mesh = model.mesh(int(model.geom_dataid[geom]))
+    first = int(mesh.vertadr[0])
+    own = model.mesh_vert[first : first + int(mesh.vertnum[0])].astype(float)
+    turn = data.geom_xmat[geom].reshape(3, 3)
+    found: np.ndarray = own @ turn.T + data.geom_xpos[geom]
+    return found
+
+
+def test_the_vertices_of_a_hull_are_where_the_level_says() -> None:
+    """Though MuJoCo moves meshes to their middles and turns them along their main axes."""
+    level = make_level(**HULLS)
+    model = compile_level(level).model
+    meshes = np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_MESH)
+    solids = [solid for solid in expand(level).solids if isinstance(solid, ConvexSolid)]
+    assert sorted(map(tuple, solids[0].corners().tolist())) == sorted(ROCK)
+    for geom, solid in zip(meshes.tolist(), solids, strict=True):
+        found, wanted = vertices(model, geom), solid.corners()
+        away = np.linalg.norm(found[:, None] - wanted, axis=-1)
+        assert sorted(away.argmin(axis=1)) == list(range(len(wanted)))
+        assert away.min(axis=1).max() < 1e-6, "single precision of a few metres"
+
+
+def test_a_hull_has_the_contact_of_a_box_of_its_material() -> None:
+    model = compile_level(make_level(**HULLS)).model
+    of_ice = [model.geom(name).id for name in names(model, "geom") if name.endswith("_ice")]
+    assert len(of_ice) == 2
+    for field in (
+        *("geom_contype", "geom_conaffinity", "geom_priority", "geom_condim", "geom_friction"),
+        *("geom_solref", "geom_solimp", "geom_margin", "geom_gap", "geom_solmix"),
+    ):
+        box, hull = getattr(model, field)[of_ice]
+        np.testing.assert_array_equal(box, hull, err_msg=field)
+
+
+def test_the_text_of_a_level_with_hulls_loads_in_plain_mujoco() -> None:
+    level = make_level(**HULLS)
+    ours, theirs = compile_level(level).model, mujoco.MjModel.from_xml_string(level_mjcf(level))
+    assert names(theirs, "geom") == names(ours, "geom")
+    for geom in np.flatnonzero(ours.geom_type == mujoco.mjtGeom.mjGEOM_MESH).tolist():
+        np.testing.assert_allclose(vertices(theirs, geom), vertices(ours, geom), atol=1e-4)
 
 
 # Contacts -----------------------------------------------------------------------------------------

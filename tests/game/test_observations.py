@@ -62,7 +62,7 @@ def test_the_state_has_the_size_of_its_entries() -> None:
 def test_every_number_lies_in_its_entrys_range_while_the_level_is_played(name: str) -> None:
     game = Game(load_level(name), num_envs=8, observation="rays")
     rng = np.random.default_rng(0)
-    parts = entries("rays")
+    parts = game.simulation.entries
     for _ in range(100):
         game.simulation.step(rng.uniform(-8.0, 8.0, (8, 2)))
         for part, values in zip(

@@ -25,6 +25,7 @@ gravity: 386
 kill_height: -1129
 falls: checkpoint
 time_limit_s: 90
+par_time_s: 45
 ball: {radius: 16, mass_kg: 1, friction: 0.3, elasticity: 0}
 start: {at: [0, 0, 16], jitter: [4, 4]}
 finish: {at: [900, 0, 16], size: [32, 32, 32], needs_coins: 3}
@@ -59,6 +60,12 @@ walls:
     thickness: 8
     material: default
     name: rail
+hulls:
+  - points: [[250, 60, 0], [290, 60, 0], [270, 90, 0], [270, 70, 30]]
+    material: ice
+    name: rock
+wedges:
+  - {at: [150, 60, 4], size: [32, 32, 8], yaw_deg: 90, material: ice, name: kicker}
 tubes:
   - start: [300, 300, 0]
     end: [300, 300, 900]

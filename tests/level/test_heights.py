@@ -8,13 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roller_env.level import Level, load_level, parse_level, shipped_levels
+from roller_env.level import Level, load_level, parse_level
 from roller_env.level.expand import expand
 from roller_env.level.schema import MAX_PIECES
 from roller_env.pieces.gate import LOWERS_TO_M, Gate
 from roller_env.pieces.piece import Piece
 from roller_env.pieces.plate import SINKS_TO_M, Plate
 from roller_env.units import quants
+from tests.builders import ORIGINALS
 from tests.level.samples import SMALL, small_level
 
 PLATE = {"name": "plate", "at": (3.0, 0.0, -0.2), "size": (1.0, 1.0, 0.56), "opens": ["gate"]}
@@ -36,7 +37,7 @@ def gate_stop(**changes: Any) -> float:
     return stop(level, Gate)
 
 
-@pytest.mark.parametrize("name", shipped_levels())
+@pytest.mark.parametrize("name", ORIGINALS)
 def test_in_shipped_levels_they_are_the_original_s_to_the_bit(name: str) -> None:
     level = load_level(name)
     assert stops(level, Plate) <= {SINKS_TO_M}

@@ -21,11 +21,16 @@ from roller_env.pieces.coin import Coins
 from roller_env.problems import FieldPath, Problem
 from roller_env.replay import frames, load_replay, shipped_replays
 from roller_env.units import quants
+from tests.builders import ORIGINALS
 from tests.level.samples import SMALL, small_level
 from tests.level.test_docs import EXAMPLES, LEFT_OUT, completed
 from tests.replay.recording import wandered
 from tests.strategies import levels
 
+SOLID_KINDS = (
+    *("floors", "boxes", "ramps", "walls", "hulls", "wedges", "tubes"),
+    *("lift_pads", "bumpers"),
+)
 RADIUS = quants(16.0)
 PLATE = {"name": "plate", "at": (3.0, 0.0, 0.25), "size": (1.0, 1.0, 0.5), "sinks_to": 0.1}
 GATE = {"name": "gate", "at": (6.0, 0.0, 1.0), "size": (0.2, 40.0, 2.0), "lowers_to": -1.1}
@@ -65,10 +70,7 @@ def test_a_new_level_is_not_warned_of() -> None:
 def test_no_example_of_the_page_is_warned_of_what_it_says_itself(example: str) -> None:
     found = warned(parse_level(completed(example)))
     # An example without a floor has none; and what the test adds lies where nothing leads.
-    if all(
-        f"{kind}:" not in example
-        for kind in ("floors", "boxes", "ramps", "walls", "tubes", "lift_pads", "bumpers")
-    ):
+    if all(f"{kind}:" not in example for kind in SOLID_KINDS):
         assert [problem.path for problem in found] == [()]
     elif re.search(r"^start:", example, re.MULTILINE):
         assert found == []
@@ -222,7 +224,7 @@ def test_a_floor_too_thin_for_the_falls_onto_it_is_warned_of() -> None:
     assert warned(boxes=[tower, thin, under], **changes) == []
 
 
-@pytest.mark.parametrize("name", shipped_levels())
+@pytest.mark.parametrize("name", ORIGINALS)
 def test_wherever_a_ball_has_been_a_coin_is_within_reach(name: str) -> None:
     """Coins are put where the ball was in the shipped demonstration, in the air as well."""
     replay = load_replay(shipped_replays()[name])

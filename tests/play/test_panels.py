@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -39,3 +40,25 @@ def test_a_coin_is_worth_ten_points_on_the_end_panel_and_percent_are_percent() -
     assert rows["Points"] == "150 of 240"
     assert rows["Coins"] == "15 of 24"
     assert rows["Score"] == "62 %"
+
+
+@pytest.mark.parametrize(
+    ("changes", "medal"),
+    [
+        ({"score_percent": 100.0, "time_s": 20.0}, "gold"),
+        ({"score_percent": 100.0, "time_s": 20.1}, "silver"),
+        ({"score_percent": 99.0, "time_s": 20.0}, "silver"),
+        ({"score_percent": 99.0, "time_s": 20.1}, "bronze"),
+        ({"success": False, "fall": True}, None),
+    ],
+)
+def test_gold_is_every_coin_within_par_and_silver_one_of_both(
+    changes: dict[str, Any], medal: str | None
+) -> None:
+    rows = dict(end_rows(replace(RESULT, **changes), COINS_IN_LEVEL, 20.0))
+    assert rows.get("Medal") == medal
+    assert rows["Time"].endswith(" s, par 20 s")
+
+
+def test_a_level_without_a_par_time_has_no_medals() -> None:
+    assert RESULT.medal(None) is None

@@ -17,7 +17,7 @@ def test_stable_baselines_learns_on_all_of_them() -> None:
     )
     levels = set()
     envs.reset()
-    for _ in range(70):
+    for _ in range(400):
         _, _, _, infos = envs.step(np.zeros(8, dtype=np.int64))
         levels |= {info["level"] for info in infos}
     assert levels == set(range(len(NAMES)))

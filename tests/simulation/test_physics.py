@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from roller_env.compile.compiled import compile_level
-from roller_env.level import shipped_levels
+from tests.builders import ORIGINALS
 from tests.simulation.driving import (
     along_the_route,
     force_on_ball,
@@ -18,7 +18,7 @@ STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
 
 @pytest.mark.parametrize("physics", ["fast", "default", "accurate"])
-@pytest.mark.parametrize("level", shipped_levels())
+@pytest.mark.parametrize("level", ORIGINALS)
 def test_a_step_is_a_loop_of_mj_step_bit_for_bit(level: str, physics: str) -> None:
     simulation = simulation_of(
         level, num_envs=3, physics=physics, reward="shaped", control_dt_s=1 / 20, num_threads=2

@@ -3,13 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from roller_env.level import shipped_levels
+from tests.builders import VARIED
 from tests.simulation.driving import simulation_of, wandering
 
 ENVS, STEPS = 25, 400
 
 
-@pytest.mark.parametrize("level", shipped_levels())
+@pytest.mark.parametrize("level", VARIED)
 def test_ten_thousand_random_steps_stay_finite(level: str) -> None:
     simulation = simulation_of(level, ENVS, reward="shaped", observation="rays")
     played = 0

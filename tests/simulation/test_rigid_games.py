@@ -21,7 +21,7 @@ from roller_env.level import load_level, shipped_levels
 from roller_env.replay import load_replay, record_episode, save_replay, verify
 from roller_env.replay.scripted import ScriptedPlayer
 from roller_env.simulation import Simulation
-from tests.builders import make_level
+from tests.builders import ORIGINALS, VARIED, make_level
 from tests.envs.checking import no_warnings_but_of_unbounded_observations
 from tests.replay.recording import wandered
 from tests.simulation.driving import along_the_route, bits, simulation_of, wandering
@@ -73,7 +73,7 @@ def test_a_copy_goes_on_with_the_same_bits(level: str) -> None:
     assert play_on(simulation) == expected
 
 
-@pytest.mark.parametrize("level", shipped_levels())
+@pytest.mark.parametrize("level", VARIED)
 def test_neither_threads_nor_company_change_a_bit(level: str) -> None:
     one, two = (
         play_on(simulation_of(level, num_envs=80, physics="rigid", num_threads=threads))
@@ -115,7 +115,7 @@ def test_in_the_intro_the_ball_hangs_still_and_then_falls() -> None:
     np.testing.assert_allclose(rigid[still : still + 8], mujoco[still : still + 8], rtol=2e-3)
 
 
-@pytest.mark.parametrize("level", shipped_levels())
+@pytest.mark.parametrize("level", ORIGINALS)
 def test_rays_measure_what_mujocos_do(level: str) -> None:
     rigid, mujoco = (
         simulation_of(level, num_envs=8, physics=name, observation="rays", reward="shaped")
@@ -135,7 +135,7 @@ def test_rays_measure_what_mujocos_do(level: str) -> None:
         )
 
 
-@pytest.mark.parametrize("level", shipped_levels())
+@pytest.mark.parametrize("level", ORIGINALS)
 def test_the_scripted_player_finishes_and_its_replay_verifies(level: str, tmp_path: Path) -> None:
     """Plates, gates and pads are on its way."""
     config = make_config(level=level, physics="rigid", num_threads=1)

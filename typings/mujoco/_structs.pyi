@@ -83,6 +83,7 @@ class MjModel:
     geom_bodyid: Array[np.int32]
     geom_conaffinity: Array[np.int32]
     geom_contype: Array[np.int32]
+    geom_dataid: Array[np.int32]
     geom_group: Array[np.int32]
     geom_matid: Array[np.int32]
     geom_pos: Array[np.float64]
@@ -93,6 +94,8 @@ class MjModel:
     geom_size: Array[np.float64]
     geom_solimp: Array[np.float64]
     geom_solref: Array[np.float64]
+    geom_type: Array[np.int32]
+    mesh_vert: Array[np.float32]
     qpos0: Array[np.float64]
     # Views of one object each, with the fields that its kind has.
     def actuator(self, key: str | int) -> Any: ...
@@ -101,6 +104,7 @@ class MjModel:
     def joint(self, key: str | int) -> Any: ...
     def light(self, key: str | int) -> Any: ...
     def material(self, key: str | int) -> Any: ...
+    def mesh(self, key: str | int) -> Any: ...
 
 class MjContact:
     dist: float
