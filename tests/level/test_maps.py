@@ -18,10 +18,17 @@ from hypothesis import strategies as st
 
 from roller_env.arrays import Float64
 from roller_env.cli.level import main
-from roller_env.level import Level, LevelError, load_level, parse_level, shipped_levels
+from roller_env.level import (
+    Level,
+    LevelError,
+    level_json_schema,
+    load_level,
+    parse_level,
+    shipped_levels,
+)
 from roller_env.level.expand import expand
 from roller_env.level.maps import export_map, parse_map, read_map
-from roller_env.level.maps.brushes import Block, Hull, body_of, corners_of
+from roller_env.level.maps.brushes import MAX_CORNERS, Block, Hull, body_of, corners_of
 from roller_env.level.maps.entities import (
     BALL,
     FINISH,
@@ -39,14 +46,14 @@ from roller_env.level.maps.entities import (
     WORLD,
 )
 from roller_env.level.maps.parse import MAX_BRUSHES, MAX_BYTES, MAX_ENTITIES, Brush, parse_entities
-from roller_env.level.schema import PIECE_FIELDS
 from roller_env.level.text import fields_text
 from roller_env.physics.presets import physics_preset
 from roller_env.pieces.box import Box
 from roller_env.pieces.camera_trigger import CameraTrigger
+from roller_env.pieces.convex import ConvexSolid
 from roller_env.pieces.fields import Part
 from roller_env.pieces.gate import Gate
-from roller_env.pieces.piece import Solid, Vector, rotation_matrix
+from roller_env.pieces.piece import Vector, rotation_matrix
 from roller_env.pieces.platform import Platform
 from roller_env.replay import load_replay
 from roller_env.replay.file import shipped_replays
@@ -169,21 +176,16 @@ def test_the_map_of_gate_is_gate() -> None:
 # Round trips --------------------------------------------------------------------------------------
 
 
-def corners_of_solid(solid: Solid) -> Float64:
-    """Return the corners of a solid, (8, 3) metres."""
-    x, y, z = solid.half_size
-    return corners_of(solid.centre, (2 * x, 2 * y, 2 * z), solid.rotation)
-
-
 def equal_but_for_solids(level: Level, wanted: Level, tolerance: float = 1e-6) -> None:
     """Hold a level against another, whose floors, walls and so on are boxes in it, in metres."""
-    for one, other in zip(expand(level).ground, expand(wanted).ground, strict=True):
-        assert same_corners(corners_of_solid(one), corners_of_solid(other), tolerance)
+    solids = sorted(expand(wanted).ground, key=lambda solid: isinstance(solid, ConvexSolid))
+    for one, other in zip(expand(level).ground, solids, strict=True):
+        assert same_corners(one.corners(), other.corners(), tolerance)
         assert level.material(one.material) == wanted.material(other.material)
     assert np.allclose(expand(level).coins, expand(wanted).coins, rtol=0.0, atol=tolerance)
     for here, there in zip(expand(level).movers, expand(wanted).movers, strict=True):
         for one, other in ((here.solid, there.solid), (here.end, there.end)):
-            assert same_corners(corners_of_solid(one), corners_of_solid(other), tolerance)
+            assert same_corners(one.corners(), other.corners(), tolerance)
     assert expand(level).regions.keys() == expand(wanted).regions.keys() - {CameraTrigger}
     for kind, regions in expand(level).regions.items():
         for region, other_region in zip(regions, expand(wanted).regions[kind], strict=True):
@@ -339,13 +341,21 @@ def test_a_brush_that_is_no_box_becomes_a_hull_of_its_material() -> None:
         ],
         "ice",
     )
-    fields = parse_map(small(world=wedge)).fields
+    found = parse_map(small(world=wedge).replace("0 0 16", "-60 0 16"))
+    fields = found.fields
     (hull,) = fields["hulls"]
     corners = {tuple(point) for point in hull["points"]}
     ends = ((0, 0), (64, 0), (0, 32))
     assert corners == {(x, y, z) for x, z in ends for y in (0, 64)}
     assert hull["material"] == "ice"
     assert fields["materials"]["ice"]["friction"] == 0.1
+    level = found.level()[0]
+    equal_but_for_solids(there_and_back(level), level)
+
+
+def test_a_hull_of_a_map_has_no_more_corners_than_one_of_a_level() -> None:
+    hull = level_json_schema()["$defs"]["Hull"]["properties"]["points"]
+    assert (hull["minItems"], hull["maxItems"]) == (4, MAX_CORNERS)
 
 
 @pytest.mark.parametrize(
@@ -785,5 +795,9 @@ def test_the_python_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyP
     exec(code, {})  # noqa: S102 - the project's own page
 
 
-def test_only_kinds_of_levels_are_in_the_table() -> None:
-    assert {kind.field for kind in KINDS.values()} <= set(PIECE_FIELDS)
+def test_a_map_can_say_all_of_a_level_but_what_the_page_says() -> None:
+    pieces = {kind.field for kind in KINDS.values()} | {"boxes", "hulls"}
+    whole = {key.field for key in WORLD.values()} | {"name", "units", "materials"}
+    parts = {"ball", "start", "finish", "route"}
+    solids = {"floors", "ramps", "walls", "tubes", "wedges"}
+    assert pieces | whole | parts | solids | {"camera_triggers"} == set(Level.model_fields)

@@ -85,6 +85,7 @@ WORLD: Final[dict[str, Key]] = {
     "kill_height": Key("kill_height", "length"),
     "falls": Key("falls", "word"),
     "time_limit_s": Key("time_limit_s", "number"),
+    "par_time_s": Key("par_time_s", "number"),
 }
 """Keys of ``worldspawn``."""
 

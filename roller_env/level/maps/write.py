@@ -29,15 +29,16 @@ from roller_env.level.maps.entities import (
     number_text,
 )
 from roller_env.level.schema import PIECE_FIELDS, Level
+from roller_env.pieces.convex import ConvexSolid
 from roller_env.pieces.fields import Part
-from roller_env.pieces.piece import Matrix, Piece, Vector, rotation_matrix
+from roller_env.pieces.piece import Matrix, Piece, Solid, Vector, rotation_matrix
 from roller_env.problems import Problem
 from roller_env.units import METRES_PER_QUANT
 
 Keys = dict[str, str]
 
-_DECIMALS: Final = 9
-"""Of map units: what is written is that near to the level."""
+_DECIMALS: Final = 12
+"""Of map units: more than is read, so that a box's centre is as if it had been written itself."""
 
 _ARM: Final = 64.0
 """Map units between the points of a plane: so far that their last decimals do not tilt it."""
@@ -61,15 +62,13 @@ class ExportedMap:
 def export_map(level: Level) -> ExportedMap:
     """Return a level as a map that `read_map` makes a level of with equal solids and pieces.
 
-    Floors, ramps, walls and tubes become the boxes that they consist of; coins come one by one.
+    Floors, ramps, walls and tubes become the boxes that they consist of, wedges become hulls; coins
+    come one by one.
 
     Args:
         level: the level, lengths in metres.
     """
-    solids = [
-        _brush(solid.centre, [2 * half for half in solid.half_size], solid.rotation, solid.material)
-        for solid in expand(level).ground
-    ]
+    solids = [_solid(solid) for solid in expand(level).ground]
     entities = [
         _entity("worldspawn", {"mapversion": "220", **_world(level)}, solids),
         _entity(START, {"origin": _point(level.start.at), **_keys(level.start, START_KEYS)}),
@@ -151,6 +150,21 @@ def _escaped(text: str) -> str:
     return text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
 
 
+def _solid(solid: Solid) -> str:
+    """Return a solid as a brush."""
+    if not isinstance(solid, ConvexSolid):
+        size = [2 * half for half in solid.half_size]
+        return _brush(solid.centre, size, solid.rotation, solid.material)
+    lines = []
+    for side in solid.sides:
+        corners, normal = np.array(side.corners), np.array(side.normal)
+        edge = corners[1] - corners[0]
+        edge -= (edge @ normal) * normal
+        along = edge / np.linalg.norm(edge)
+        lines.append(_face(corners[0] / METRES_PER_QUANT, normal, along, solid.material))
+    return "".join(["{\n", *lines, "}\n"])
+
+
 def _brush(at: Vector, size: Iterable[float], rotation: Matrix, texture: str) -> str:
     """Return a box, in metres, as a brush."""
     centre = np.array(at) / METRES_PER_QUANT
@@ -159,16 +173,25 @@ def _brush(at: Vector, size: Iterable[float], rotation: Matrix, texture: str) ->
     lines = []
     for axis, sign in _SIDES:
         normal = sign * axes[axis]
-        along = axes[(axis + 1) % 3]
-        across = np.cross(normal, along)
-        point = centre + half[axis] * normal
-        # Clockwise for whoever looks at the outside.
-        corners = (point + _ARM * along, point, point + _ARM * across)
-        plane = " ".join(f"( {_numbers(corner)} )" for corner in corners)
-        lines.append(
-            f"{plane} {TEXTURES}{texture} [ {_numbers(along)} 0 ] [ {_numbers(across)} 0 ] 0 1 1\n"
-        )
+        lines.append(_face(centre + half[axis] * normal, normal, axes[(axis + 1) % 3], texture))
     return "".join(["{\n", *lines, "}\n"])
+
+
+def _face(point: Float64, normal: Float64, along: Float64, texture: str) -> str:
+    """Return the line of a face.
+
+    Args:
+        point: (3,) on its plane, map units.
+        normal: (3,) unit vector, outwards.
+        along: (3,) unit vector in the plane.
+        texture: the last part of its texture's name.
+    """
+    across = np.cross(normal, along)
+    # Clockwise for whoever looks at the outside.
+    corners = (point + _ARM * along, point, point + _ARM * across)
+    plane = " ".join(f"( {_numbers(corner)} )" for corner in corners)
+    axes = f"[ {_numbers(along)} 0 ] [ {_numbers(across)} 0 ]"
+    return f"{plane} {TEXTURES}{texture} {axes} 0 1 1\n"
 
 
 def _point(at: Iterable[float]) -> str:
