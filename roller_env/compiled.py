@@ -234,7 +234,7 @@ class _Wait:
                 "in every process, since Numba finds no directory to keep them in; set "
                 "NUMBA_CACHE_DIR to one that can be written to"
             )
-        print(f"Roller: compiling the rules (up to half a minute), {how_often}", file=sys.stderr)
+        print(f"Roller: compiling the rules (up to a minute), {how_often}", file=sys.stderr)
 
 
 _WAIT: Final = _Wait()

@@ -39,7 +39,7 @@ def test_one_line_says_what_is_waited_for_and_only_where_there_is_something_to_w
     tmp_path: Path,
 ) -> None:
     cold = said_by_a_new_process(tmp_path, USE_A_RULE)
-    assert cold == ["Roller: compiling the rules (up to half a minute), once for this machine"]
+    assert cold == ["Roller: compiling the rules (up to a minute), once for this machine"]
     assert said_by_a_new_process(tmp_path, USE_A_RULE) == []
 
 

@@ -248,7 +248,7 @@ def test_a_ball_that_is_driven_off_the_edge_was_within_reach_all_the_way_down(se
     assert found.coins.all()
 
 
-@settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=15, suppress_health_check=[HealthCheck.too_slow])
 @given(levels())
 def test_every_valid_level_can_be_looked_at(level: Level) -> None:
     for problem in lint(level, play(), "quant"):

@@ -665,7 +665,7 @@ def test_thousands_of_changed_numbers_give_levels_or_level_errors() -> None:
     words = re.split(r"([\s\"]+)", text)
     places = [at for at, word in enumerate(words) if re.fullmatch(r"-?[0-9.]+", word)]
     levels = 0
-    for _ in range(3_000):
+    for _ in range(1_000):
         changed = list(words)
         for at in rng.sample(places, rng.choice([1, 1, 2, 5])):
             changed[at] = rng.choice(values)
