@@ -44,7 +44,7 @@ _HEAD: Final = """# Gallery
 The levels that come with Roller, from easy to hard. `roller play NAME` plays one; a
 replay of each comes with the package, which collects every coin and verifies bit for bit
 (`roller replay NAME`). Gold is the finish with every coin within the par time, silver with one of
-both, bronze the finish; the par time is a quarter more than the solver took.
+both, bronze the finish; the par time is at least a fifth more than the solver took.
 
 <!-- Written by scripts/gallery.py. -->
 """
