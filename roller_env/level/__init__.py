@@ -5,10 +5,10 @@ from __future__ import annotations
 from roller_env.level.check import check_level
 from roller_env.level.doubts import level_warnings
 from roller_env.level.errors import LevelError, LevelWarning
+from roller_env.level.json_schema import level_json_schema
 from roller_env.level.load import (
     examine_level,
     is_path,
-    level_json_schema,
     levels_directory,
     load_level,
     parse_level,

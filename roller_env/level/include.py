@@ -7,6 +7,7 @@ may, so that a level of a stranger opens nothing else and costs no more than ano
 from __future__ import annotations
 
 from collections.abc import Iterator
+from os.path import realpath
 from pathlib import Path
 from typing import Final
 
@@ -44,8 +45,8 @@ class _Reader:
     def __init__(self, path: Path | None) -> None:
         self.files: list[File] = []
         self.problems: list[Problem] = []
-        self._folder = path.resolve().parent if path else None
-        self._known: set[Path] = {path.resolve()} if path else set()
+        self._folder = _real(path).parent if path else None
+        self._known: set[Path] = {_real(path)} if path else set()
         self._bytes = self._values = 0
 
     def follow(self, file: File, path: Path | None, open_files: tuple[Path, ...] = ()) -> None:
@@ -53,13 +54,13 @@ class _Reader:
         self.files.append(file)
         self._bytes += len(file.text.encode("utf-8", "surrogatepass"))
         self._values += file.root.values
-        here = (*open_files, path.resolve()) if path else ()
+        here = (*open_files, _real(path)) if path else ()
         for where, node in self._entries(file):
             origin = Origin(file, where, node)
             target = self._target(origin, path)
             if target is None:
                 continue
-            resolved = target.resolve()
+            resolved = _real(target)
             if resolved in here:
                 self._report(origin, "the file includes itself, here or by way of others")
             elif resolved not in self._known and self._has_room(origin):
@@ -91,7 +92,7 @@ class _Reader:
             self._report(origin, message)
         else:
             target = path.parent / name
-            if target.resolve().is_relative_to(self._folder):
+            if _real(target).is_relative_to(self._folder):
                 return target
             self._report(origin, f"found {quoted(name)}, which leads out of the level's folder")
         return None
@@ -120,3 +121,8 @@ class _Reader:
 
     def _report(self, origin: Origin, message: str) -> None:
         self.problems.append(origin.told(Problem((), message)))
+
+
+def _real(path: Path) -> Path:
+    """Return where a file lies, all links followed; without an error for links in a ring."""
+    return Path(realpath(path))

@@ -17,8 +17,6 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
-from pydantic.json_schema import GenerateJsonSchema
-from pydantic_core import CoreSchema
 
 from roller_env.assets import LEVELS, asset_directory
 from roller_env.level.check import check_level
@@ -156,38 +154,6 @@ def levels_directory() -> Path:
         FileNotFoundError: the installation has lost it.
     """
     return asset_directory("levels")
-
-
-class _EditorSchema(GenerateJsonSchema):
-    """Pydantic's schema without the titles it makes of the field names, which say nothing."""
-
-    def field_title_should_be_set(self, schema: Any) -> bool:
-        return False
-
-    def generate(self, schema: CoreSchema, mode: Any = "validation") -> dict[str, Any]:
-        said: dict[str, Any] = _draft_07(super().generate(schema, mode))
-        return {"$schema": "http://json-schema.org/draft-07/schema#", **said}
-
-
-def level_json_schema() -> dict[str, Any]:
-    """Return the JSON Schema (draft 7) of a level file, for editors to complete from."""
-    schema = LevelFile.model_json_schema(schema_generator=_EditorSchema)
-    schema["title"] = "Roller level"
-    schema["description"] = "A level of Roller; see docs/levels.md."
-    return schema
-
-
-def _draft_07(schema: Any) -> Any:
-    """Say lists of fixed length in the words of draft 7, which every editor understands."""
-    if isinstance(schema, list):
-        return [_draft_07(item) for item in schema]
-    if not isinstance(schema, dict):
-        return schema
-    said = {key: _draft_07(value) for key, value in schema.items()}
-    if "prefixItems" in said:
-        said["items"], *others = said.pop("prefixItems")
-        assert all(other == said["items"] for other in others), "a list of unlike items"
-    return said
 
 
 def _path_of(source: str | os.PathLike[str]) -> Path:

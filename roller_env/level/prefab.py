@@ -420,7 +420,8 @@ def _frames(entry: Any, count: int) -> Iterator[Frame]:
     base = Frame(tuple(entry.get("at", (0, 0, 0))), entry.get("yaw_deg", 0))
     repeat = entry.get("repeat") or {}
     step, turn_deg = repeat.get("step", (0, 0, 0)), repeat.get("turn_deg", 0)
-    x, y = 0, 0
+    x: float = 0
+    y: float = 0
     for number in range(count):
         if not turn_deg:  # as exact as the numbers are
             x, y = number * step[0], number * step[1]
