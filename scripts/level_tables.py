@@ -7,6 +7,7 @@ model, with its default (lengths in quants) and its description, to which its li
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, get_args
 
@@ -60,6 +61,9 @@ def _models() -> dict[str, type[Part]]:
     return found
 
 
+@cache
+@cache
+@cache
 def _schema(name: str) -> dict[str, Any]:
     whole = level_json_schema()
     return dict(whole if name == "Level" else whole["$defs"][name])

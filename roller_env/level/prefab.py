@@ -196,9 +196,7 @@ class _Expander:
         try:
             fields_of_piece = item.fields()
         except CannotTurn:
-            found = (
-                f"its edges lie along x and y, but it is turned by {item.frame.yaw_deg:g} degrees"
-            )
+            found = f"it has edges along x and y, and is turned by {item.frame.yaw_deg:g} degrees"
             self._report(item.origin, f"{found}; wanted a multiple of 90")
             return
         origins[item.kind, len(pieces)] = item.origin
@@ -336,7 +334,10 @@ class _Expander:
         values = self._values(entry, prefab)
         if values is None:
             return None
-        filled = self._filled(prefab, values)
+        fields = prefab.node.value
+        assert isinstance(fields, dict), "a prefab that is kept is a group"
+        body = {name: node for name, node in fields.items() if name != "parameters"}
+        filled = self._filled(replace(prefab, node=replace(prefab.node, value=body)), values)
         if filled.height > MAX_DEPTH:
             self._report(entry, f"with its parameters nested more than {MAX_DEPTH} levels deep")
             return None
@@ -371,7 +372,7 @@ class _Expander:
             return replace(value, line=node.line, column=node.column, is_block=False)
         children: dict[Any, Node] = {}
         if isinstance(inner, dict):
-            children = {name: node for name, node in inner.items() if name != "parameters"}
+            children = dict(inner)
         elif isinstance(inner, list):
             children = dict(enumerate(inner))
         filled = {
