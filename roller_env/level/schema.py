@@ -22,6 +22,7 @@ from roller_env.pieces.bumper import Bumper
 from roller_env.pieces.camera_trigger import CameraTrigger
 from roller_env.pieces.checkpoint import Checkpoint
 from roller_env.pieces.coin import Coins
+from roller_env.pieces.curve import Bowl, HalfPipe, Spiral
 from roller_env.pieces.fan import Fan
 from roller_env.pieces.fields import (
     METRES_PER_UNIT,
@@ -158,6 +159,9 @@ class Level(Part):
     walls: tuple[Wall, ...] = ()
     hulls: tuple[Hull, ...] = ()
     wedges: tuple[Wedge, ...] = ()
+    half_pipes: tuple[HalfPipe, ...] = ()
+    bowls: tuple[Bowl, ...] = ()
+    spirals: tuple[Spiral, ...] = ()
     tubes: tuple[Tube, ...] = ()
     plates: tuple[Plate, ...] = ()
     switches: tuple[Switch, ...] = ()
