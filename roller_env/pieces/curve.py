@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Annotated
+from typing import Annotated, Final
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -30,6 +30,10 @@ from roller_env.pieces.fields import (
 )
 from roller_env.pieces.piece import Count, Piece, Solid
 from roller_env.units import quants
+
+_SECTORS: Final = 6
+"""Faces of a bowl's lowest ring; each further ring has two in each sector more, so that all faces
+are about as large: six nearly equilateral triangles meet at a corner."""
 
 Segments = Annotated[int, Field(strict=True, ge=2, le=180)]
 
@@ -80,56 +84,41 @@ class HalfPipe(Piece):
 
 
 class Bowl(Piece):
-    """A piece of a hollow sphere, open at the top."""
+    """A piece of a hollow sphere, open at the top, in faces of three corners."""
 
-    at: Point = Field(description="Lowest point of the sphere.")
+    at: Point = Field(description="Its lowest point.")
     radius: PositiveLength = Field(description="From the sphere's middle to the faces' corners.")
     arc_deg: Annotated[Number, Field(ge=10.0, le=180.0)] = Field(
         120.0, description="From rim to rim, as seen from the sphere's middle."
     )
-    segments: Annotated[int, Field(strict=True, ge=3, le=61)] = Field(
-        17, description="How many faces there are from rim to rim; an even number has one less."
+    rings: Annotated[int, Field(strict=True, ge=1, le=9)] = Field(
+        8, description="How many rings of faces there are from the bottom to the rim."
     )
     thickness: PositiveLength = Field(quants(8.0), description="Outwards from the surface.")
     material: MaterialName = "default"
     name: OptionalName = None
 
-    @property
-    def _rings(self) -> int:
-        """How many rings of faces lie round the level one at the bottom."""
-        return (self.segments - 1) // 2
-
-    @property
-    def _step(self) -> float:
-        """Angle of a face from ring to ring, radians; the face at the bottom is as wide."""
-        return math.radians(self.arc_deg) / 2 / (self._rings + 0.5)
-
-    @property
-    def _around(self) -> int:
-        """How many faces make a ring: so many that those at the rim are about square."""
-        rim = math.sin(math.radians(self.arc_deg) / 2)
-        return max(6, math.ceil(2.0 * math.pi * rim / self._step))
-
     def count(self) -> Count:
         """Return the number of its faces."""
-        return Count(1 + self._rings * self._around)
+        return Count(_SECTORS * self.rings**2)
 
     def solids(self, source: str) -> Iterator[Solid]:
         """Yield what is behind each face, from the bottom upwards."""
-        polar = (np.arange(self._rings + 1) + 0.5) * self._step
-        turn = np.arange(self._around) * (2.0 * math.pi / self._around)
-        flat = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=-1)
-        down = np.array([0.0, 0.0, -1.0])
-        outwards = np.sin(polar)[:, None, None] * flat + np.cos(polar)[:, None, None] * down
         radii = np.array([self.radius, self.radius + self.thickness])
-        middle = np.array(self.at) - self.radius * down
-        # (ring, turn, layer, xyz)
-        corners = middle + radii[:, None] * outwards[:, :, None]
-        yield _solid(corners[0], self.material, source)
-        for ring in range(self._rings):
-            for face in range(self._around):
-                turns = [face, (face + 1) % self._around]
-                yield _solid(corners[ring : ring + 2, turns], self.material, source)
+        middle = np.array(self.at) + np.array([0.0, 0.0, self.radius])
+        inner = np.array([[0.0, 0.0, -1.0]])
+        for ring in range(1, self.rings + 1):
+            outer = self._outwards(ring)
+            for face in _strip(inner, outer, ring):
+                yield _solid(middle + radii[:, None, None] * face, self.material, source)
+            inner = outer
+
+    def _outwards(self, ring: int) -> Float64:
+        """Return the directions of the corners on the upper edge of a ring, (6 ring, 3)."""
+        polar = math.radians(self.arc_deg) / 2 * ring / self.rings
+        turn = np.arange(_SECTORS * ring) * (2.0 * math.pi / (_SECTORS * ring))
+        flat = math.sin(polar) * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        return np.column_stack([flat, np.full(len(turn), -math.cos(polar))])
 
 
 class Spiral(Piece):
@@ -188,8 +177,25 @@ class Spiral(Piece):
                 yield _solid(np.array(face), self.material, source)
 
 
+def _strip(inner: Float64, outer: Float64, ring: int) -> Iterator[Float64]:
+    """Yield the triangles, (3, 3), between the edges of a ring of a bowl.
+
+    Args:
+        inner: its lower corners, (6 (ring - 1), 3), or the one at the bottom.
+        outer: its upper corners, (6 ring, 3).
+        ring: its number, from 1.
+    """
+    for sector in range(_SECTORS):
+        low, high = sector * (ring - 1), sector * ring
+        for step in range(ring):
+            near, far = low + step, high + step
+            yield np.stack([inner[near % len(inner)], outer[far], outer[(far + 1) % len(outer)]])
+            if step < ring - 1:
+                following = inner[(near + 1) % len(inner)]
+                yield np.stack([inner[near], outer[(far + 1) % len(outer)], following])
+
+
 def _solid(corners: Float64, material: str, source: str) -> ConvexSolid:
     """Return the hull of corners, (..., 3) metres."""
-    return ConvexSolid.of(
-        [(x, y, z) for x, y, z in corners.reshape(-1, 3).tolist()], material, source
-    )
+    points = [(x, y, z) for x, y, z in corners.reshape(-1, 3).tolist()]
+    return ConvexSolid.of(points, material, source)

@@ -98,9 +98,9 @@ def paths_of(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 def test_a_level_with_junk_at_any_field_gives_a_level_or_a_level_error(
     data: st.DataObject, sound: dict[str, Any]
 ) -> None:
-    level = copy.deepcopy(sound)
+    level: Any = copy.deepcopy(sound)
     *outer, last = data.draw(st.sampled_from([path for path in paths_of(level) if path]))
-    parent = level
+    parent: Any = level
     for part in outer:
         parent = parent[part]
     change = data.draw(st.sampled_from(["delete", "replace", "rename", "repeat"]))
