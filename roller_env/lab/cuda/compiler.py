@@ -1,0 +1,115 @@
+"""Numba for CUDA, told what it must know of our kernels: the functions are those of the CPU."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from types import SimpleNamespace
+from typing import Any, Final
+
+import numba
+from numba import config, cuda
+
+from roller_env.compiled import DeviceFunction
+
+HOPPER: Final = (9, 0)
+"""Compute capability of an H100, for which PTX is made where there is no card."""
+
+
+@cache
+def know_device_functions() -> None:
+    """Have Numba for CUDA compile a `DeviceFunction` as it does what Numba itself decorates."""
+    if config.ENABLE_CUDASIM:  # type: ignore[attr-defined]
+        return
+    from numba.cuda.descriptor import cuda_target
+    from numba.cuda.extending import typeof_impl
+
+    @typeof_impl.register(DeviceFunction)
+    def _(function: DeviceFunction[..., Any], context: Any) -> Any:
+        return cuda_target.typing_context.resolve_value_type(function.dispatcher)
+
+
+@contextmanager
+def as_written() -> Iterator[None]:
+    """Compile IEEE arithmetic in the order written, as the CPU's: no product is fused with a sum.
+
+    Numba has no option for that switch of NVIDIA's compiler.
+    """
+    if config.ENABLE_CUDASIM:  # type: ignore[attr-defined]
+        yield
+        return
+    from numba.cuda.cudadrv import nvvm
+
+    original = nvvm.compile_ir
+
+    def compile_ir(modules: Any, **options: Any) -> Any:
+        return original(modules, **{**options, "fma": 0})
+
+    nvvm.compile_ir = compile_ir
+    try:
+        yield
+    finally:
+        nvvm.compile_ir = original
+
+
+@contextmanager
+def _card(capability: tuple[int, int]) -> Iterator[None]:
+    """Have Numba believe that there is a card: it asks one before it compiles a device function."""
+    from numba.cuda import dispatcher
+
+    original = dispatcher.get_current_device
+    dispatcher.get_current_device = lambda: SimpleNamespace(compute_capability=capability)
+    try:
+        yield
+    finally:
+        dispatcher.get_current_device = original
+
+
+def ptx_of(kernel: Any, arguments: tuple[Any, ...]) -> str:
+    """Return the PTX of a kernel for an H100, whether or not there is one.
+
+    Args:
+        kernel: Python function.
+        arguments: that it would be called with; arrays may be NumPy's.
+    """
+    know_device_functions()
+    types = [numba.typeof(each) for each in arguments]  # type: ignore[no-untyped-call]
+    with _card(HOPPER):
+        ptx, _ = cuda.compile(
+            kernel, numba.void(*types), cc=HOPPER, device=False, abi="numba", output="ptx"
+        )
+    return str(ptx)
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """What NVIDIA's assembler says of a kernel.
+
+    Attributes:
+        bytes: of machine code.
+        registers: of a thread.
+        stack: bytes of a thread's local memory.
+    """
+
+    bytes: int
+    registers: int
+    stack: int
+
+
+def assembled(ptx: str) -> Machine:
+    """Assemble PTX for an H100, which needs no card."""
+    from cuda.bindings import nvjitlink  # type: ignore[import-not-found]
+
+    options = ["-arch=sm_90", "-verbose", "-O3"]
+    linker = nvjitlink.create(len(options), options)
+    text = ptx.encode() + b"\0"
+    nvjitlink.add_data(linker, nvjitlink.InputType.PTX, text, len(text), "kernel")
+    nvjitlink.complete(linker)
+    log = bytearray(nvjitlink.get_info_log_size(linker))
+    nvjitlink.get_info_log(linker, log)
+    found = re.findall(r"used (\d+) registers.*?(\d+) stack", log.decode())
+    registers, stack = max((int(a), int(b)) for a, b in found)
+    return Machine(nvjitlink.get_linked_cubin_size(linker), registers, stack)
