@@ -25,21 +25,32 @@ Array = npt.NDArray[Any]
 _GROUPS: Final = {np.dtype(np.float64): 0, np.dtype(np.int64): 1, np.dtype(np.bool_): 2}
 
 
-class Mould:
-    """One env on the CPU, of which a card's are made.
+class Player:
+    """What plays envs of one level on a card, made after one env on the CPU.
 
     Attributes:
         simulation: the env.
         fresh: (1, ...) its rows at the start, before the jitter.
-        step: the kernel that plays it, a Python function.
+        kernels: what runs on the card, Python functions by name.
     """
 
-    def __init__(self, config: EnvConfig) -> None:
+    def __init__(self, config: EnvConfig, registers: int | None = None) -> None:
         """Make the env.
 
         Args:
             config: options of the env; its physics is ``rigid`` or ``relaxed``.
+            registers: of a thread, at most; None: as many as the compiler likes.
+
+        Raises:
+            ValueError: the physics is MuJoCo's.
         """
+        if config.preset.engine != "rigid":
+            raise ValueError(
+                f"physics: found {config.preset.name!r}; on a card there are 'rigid' and 'relaxed'"
+            )
+        know_device_functions()
+        self._limits = {} if registers is None else {"max_registers": registers}
+        self._compiled: dict[str, Any] = {}
         self.simulation = Simulation(config, 1)
         self.simulation.state.truncated[:] = False  # As at the beginning of an episode.
         physics, games = self.simulation._physics, self.simulation._games
@@ -69,12 +80,21 @@ class Mould:
         self.fresh = Rows(*(np.concatenate(group, axis=1) for group in columns))
         room = physics._path.at.shape[1]  # type: ignore[attr-defined]
         listed = int(np.diff(self._scenes.cell_start).max())
-        self.step = step_of(room, self._scenes.slab_stop.shape[1], listed)
+        step = step_of(room, self._scenes.slab_stop.shape[1], listed)
+        self.kernels: dict[str, Callable[..., None]] = {"step": step, "draw": draw}
 
     @property
     def entries(self) -> int:
         """How many numbers an observation has."""
         return sum(entry.size for entry in self.simulation.entries)
+
+    def compiled(self, name: str, *arguments: Any) -> Any:
+        """Return a kernel for arguments like these; all envs of one level have the same types."""
+        if name not in self._compiled:
+            with as_written():
+                kernel = cuda.jit(self.kernels[name], **self._limits)
+                self._compiled[name] = kernel.specialize(*arguments)
+        return self._compiled[name]
 
     def games(
         self, rows: Rows, fresh: Rows, random: Any, to_device: Callable[[Array], Any]
@@ -133,7 +153,10 @@ class Mould:
         """Return the state of N envs in rows that were copied back, by name."""
         arrays = self.simulation.state.named()
         found = {name: _view(rows, *self._place[id(a)], a.ndim) for name, a in arrays.items()}
-        return {"physics": _view(rows, *self._place[id(self.simulation._physics.state)], 2), **found}
+        return {
+            "physics": _view(rows, *self._place[id(self.simulation._physics.state)], 2),
+            **found,
+        }
 
 
 class CudaGames:
@@ -143,46 +166,38 @@ class CudaGames:
     NEXT_STEP autoreset and without its infos. Their random numbers are others: the card's own.
 
     Attributes:
-        mould: of the envs.
         force_n: (N, 2) newtons on each ball in the next step, on the card.
         observation: (N, entries) float32 after a step, on the card.
     """
 
-    def __init__(
-        self, config: EnvConfig, count: int, *, seed: int = 0, registers: int | None = None
-    ) -> None:
+    def __init__(self, player: Player, count: int, seed: int = 0) -> None:
         """Make the envs; the first step begins an episode in all.
 
         Args:
-            config: options of the envs; the physics is ``rigid`` or ``relaxed``.
+            player: of the level; it compiles for the first envs that it gets.
             count: how many, N.
             seed: of the random numbers.
-            registers: of a thread at most, where the compiler may not have as many as it likes.
         """
-        know_device_functions()
-        self.mould = Mould(config)
+        self._player = player
         rows = Rows(
-            *(cuda.device_array((count, e.shape[1]), e.dtype, order="F") for e in self.mould.fresh)
+            *(cuda.device_array((count, e.shape[1]), e.dtype, order="F") for e in player.fresh)
         )
         # Every env is over.
         rows.flags.copy_to_device(np.ones(rows.flags.shape, dtype=bool, order="F"))
-        fresh = Rows(*map(cuda.to_device, self.mould.fresh))
+        fresh = Rows(*map(cuda.to_device, player.fresh))
         random = create_xoroshiro128p_states(count, seed)
-        self._games = self.mould.games(rows, fresh, random, cuda.to_device)
-        self.force_n = cuda.device_array((count, 2), order="F")
-        self.force_n.copy_to_device(np.zeros((count, 2), order="F"))
-        self.observation = cuda.device_array((count, self.mould.entries), np.float32, order="F")
+        self._games = player.games(rows, fresh, random, cuda.to_device)
+        self.force_n = cuda.to_device(np.zeros((count, 2), order="F"))
+        self.observation = cuda.device_array((count, player.entries), np.float32, order="F")
         self._choices = cuda.to_device(forces("directions", np.arange(len(DIRECTIONS))))
         self._launch = -(-count // THREADS_A_BLOCK), THREADS_A_BLOCK
-        with as_written():
-            self._step = cuda.jit(self.mould.step, max_registers=registers).specialize(
-                self._games, self.force_n, self.observation
-            )
-            self._draw = cuda.jit(draw).specialize(random, self._choices, self.force_n)
 
     def draw(self) -> None:
         """Draw random actions on the card."""
-        self._draw[self._launch](self._games.random, self._choices, self.force_n)
+        random, choices, force_n = self._games.random, self._choices, self.force_n
+        self._player.compiled("draw", random, choices, force_n)[self._launch](
+            random, choices, force_n
+        )
 
     def push(self, force_n: Float64) -> None:
         """Take the forces of the next step from the CPU, (N, 2) newtons."""
@@ -190,11 +205,12 @@ class CudaGames:
 
     def step(self) -> None:
         """Advance every env by a control step, or begin it anew."""
-        self._step[self._launch](self._games, self.force_n, self.observation)
+        games, force_n, out = self._games, self.force_n, self.observation
+        self._player.compiled("step", games, force_n, out)[self._launch](games, force_n, out)
 
-    def rows(self) -> Rows:
-        """Return a copy of all that varies, on the CPU."""
-        return Rows(*(each.copy_to_host() for each in self._games.rows))
+    def state(self) -> Mapping[str, Array]:
+        """Return a copy of the state on the CPU, by name: ``physics``, and that of the rules."""
+        return self._player.named(Rows(*(each.copy_to_host() for each in self._games.rows)))
 
     def observe(self) -> Float32:
         """Return a copy of what was seen after the last step, (N, entries), on the CPU."""

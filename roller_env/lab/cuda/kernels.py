@@ -150,12 +150,7 @@ def step_of(knots: int, slabs: int, most_near: int) -> Callable[[Games, Float64,
         many = cuda.local.array(1, numba.int64)
         c, at, envs = games.concluding, games.at, games.every[env : env + 1]
         state = c.state
-        if (
-            state.finished[env]
-            or state.fallen[env]
-            or state.diverged[env]
-            or state.truncated[env]
-        ):
+        if state.finished[env] or state.fallen[env] or state.diverged[env] or state.truncated[env]:
             _begin(games, env)
         else:
             preparing = Preparing(
@@ -185,9 +180,7 @@ def step_of(knots: int, slabs: int, most_near: int) -> Callable[[Games, Float64,
             )
             if _diverged(games.physics[env]):
                 _end_diverged(games, env, path, many)
-            conclude(
-                c, games.physics, at, games.duration_s, games.rewarding, envs, path, many
-            )
+            conclude(c, games.physics, at, games.duration_s, games.rewarding, envs, path, many)
         showing = Showing(
             c.level_of,
             c.regions,
