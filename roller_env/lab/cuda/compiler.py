@@ -7,13 +7,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from types import SimpleNamespace
 from typing import Any, Final
 
-import numba
-from numba import config, cuda
-
 from roller_env.compiled import DeviceFunction
+
+# Numba's own types say less of it than there is.
+numba: Any = import_module("numba")
+cuda: Any = import_module("numba.cuda")
 
 HOPPER: Final = (9, 0)
 """Compute capability of an H100, for which PTX is made where there is no card."""
@@ -22,14 +24,14 @@ HOPPER: Final = (9, 0)
 @cache
 def know_device_functions() -> None:
     """Have Numba for CUDA compile a `DeviceFunction` as it does what Numba itself decorates."""
-    if config.ENABLE_CUDASIM:  # type: ignore[attr-defined]
+    if numba.config.ENABLE_CUDASIM:
         return
-    from numba.cuda.descriptor import cuda_target
-    from numba.cuda.extending import typeof_impl
+    typing: Any = import_module("numba.cuda.descriptor").cuda_target.typing_context
 
-    @typeof_impl.register(DeviceFunction)
-    def _(function: DeviceFunction[..., Any], context: Any) -> Any:
-        return cuda_target.typing_context.resolve_value_type(function.dispatcher)
+    def type_of(function: DeviceFunction[..., Any], context: Any) -> Any:
+        return typing.resolve_value_type(function.dispatcher)
+
+    import_module("numba.cuda.extending").typeof_impl.register(DeviceFunction, type_of)
 
 
 @contextmanager
@@ -38,11 +40,10 @@ def as_written() -> Iterator[None]:
 
     Numba has no option for that switch of NVIDIA's compiler.
     """
-    if config.ENABLE_CUDASIM:  # type: ignore[attr-defined]
+    if numba.config.ENABLE_CUDASIM:
         yield
         return
-    from numba.cuda.cudadrv import nvvm
-
+    nvvm: Any = import_module("numba.cuda.cudadrv.nvvm")
     original = nvvm.compile_ir
 
     def compile_ir(modules: Any, **options: Any) -> Any:
@@ -58,8 +59,7 @@ def as_written() -> Iterator[None]:
 @contextmanager
 def _card(capability: tuple[int, int]) -> Iterator[None]:
     """Have Numba believe that there is a card: it asks one before it compiles a device function."""
-    from numba.cuda import dispatcher
-
+    dispatcher: Any = import_module("numba.cuda.dispatcher")
     original = dispatcher.get_current_device
     dispatcher.get_current_device = lambda: SimpleNamespace(compute_capability=capability)
     try:
@@ -76,7 +76,7 @@ def ptx_of(kernel: Any, arguments: tuple[Any, ...]) -> str:
         arguments: that it would be called with; arrays may be NumPy's.
     """
     know_device_functions()
-    types = [numba.typeof(each) for each in arguments]  # type: ignore[no-untyped-call]
+    types = [numba.typeof(each) for each in arguments]
     with _card(HOPPER):
         ptx, _ = cuda.compile(
             kernel, numba.void(*types), cc=HOPPER, device=False, abi="numba", output="ptx"
@@ -101,8 +101,7 @@ class Machine:
 
 def assembled(ptx: str) -> Machine:
     """Assemble PTX for an H100, which needs no card."""
-    from cuda.bindings import nvjitlink  # type: ignore[import-not-found]
-
+    nvjitlink: Any = import_module("cuda.bindings.nvjitlink")
     options = ["-arch=sm_90", "-verbose", "-O3"]
     linker = nvjitlink.create(len(options), options)
     text = ptx.encode() + b"\0"

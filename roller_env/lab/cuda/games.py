@@ -7,14 +7,13 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from numba import cuda
 from numba.cuda.random import create_xoroshiro128p_states
 
 from roller_env.arrays import Float32, Float64
 from roller_env.compile.rigid import CAP_S
 from roller_env.config import EnvConfig
 from roller_env.game.actions import DIRECTIONS, forces
-from roller_env.lab.cuda.compiler import as_written, know_device_functions
+from roller_env.lab.cuda.compiler import as_written, cuda, know_device_functions
 from roller_env.lab.cuda.kernels import Games, Rows, draw, step_of
 from roller_env.simulation import Simulation
 
@@ -185,7 +184,7 @@ class CudaGames:
         # Every env is over.
         rows.flags.copy_to_device(np.ones(rows.flags.shape, dtype=bool, order="F"))
         fresh = Rows(*map(cuda.to_device, player.fresh))
-        random = create_xoroshiro128p_states(count, seed)
+        random = create_xoroshiro128p_states(count, seed)  # type: ignore[no-untyped-call]
         self._games = player.games(rows, fresh, random, cuda.to_device)
         self.force_n = cuda.to_device(np.zeros((count, 2), order="F"))
         self.observation = cuda.device_array((count, player.entries), np.float32, order="F")

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-from numba import cuda
 from numba.cuda.random import xoroshiro128p_uniform_float64
 
 from roller_env.arrays import Bool, Float32, Float64, Int64
 from roller_env.compile.rigid import LARGEST
+from roller_env.compiled import part
 from roller_env.game.rewards import POINTS
 from roller_env.game.step import (
     Concluding,
@@ -24,6 +24,7 @@ from roller_env.game.step import (
     prepare,
 )
 from roller_env.game.tables import Movers
+from roller_env.lab.cuda.compiler import cuda
 from roller_env.physics.protocol import Columns
 from roller_env.physics.rigid.scene import Scenes
 from roller_env.physics.rigid.states import Counts
@@ -38,9 +39,9 @@ class Rows(NamedTuple):
     the same column of neighbouring envs before them, read one piece of memory.
     """
 
-    reals: Float64  # (N, D)
-    counts: Int64  # (N, C)
-    flags: Bool  # (N, F)
+    reals: Any  # (N, D) float64, here and on the card
+    counts: Any  # (N, C) int64
+    flags: Any  # (N, F) bool
 
 
 class Games(NamedTuple):
@@ -83,13 +84,13 @@ class Games(NamedTuple):
     random: Any
 
 
-@cuda.jit(device=True)
+@part
 def _copy(rows: Any, fresh: Any, env: int) -> None:
     for column in range(fresh.shape[1]):
         rows[env, column] = fresh[0, column]
 
 
-@cuda.jit(device=True)
+@part
 def _begin(games: Games, env: int) -> None:
     """Put an env back to where the level begins, as `Simulation.reset` does."""
     _copy(games.rows.reals, games.fresh.reals, env)
@@ -104,7 +105,7 @@ def _begin(games: Games, env: int) -> None:
         measure(concluding, games.physics, at, games.rewarding, envs, games.unmoved)
 
 
-@cuda.jit(device=True)
+@part
 def _end_diverged(games: Games, env: int, path: Float64, knots: Int64) -> None:
     """Put the physics of an env that diverged back to where it is finite, and end its game."""
     for column in range(games.physics.shape[1]):
@@ -116,12 +117,12 @@ def _end_diverged(games: Games, env: int, path: Float64, knots: Int64) -> None:
     games.concluding.state.diverged[env] = True
 
 
-@cuda.jit(device=True)
+@part
 def _diverged(body: Float64) -> bool:
+    wrong = False
     for number in range(len(body)):
-        if not abs(body[number]) <= LARGEST:
-            return True
-    return False
+        wrong = wrong or not abs(body[number]) <= LARGEST
+    return wrong
 
 
 def step_of(knots: int, slabs: int, most_near: int) -> Callable[[Games, Float64, Float32], None]:

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numba import cuda
 
 from roller_env.config import EnvConfig
 from roller_env.envs.vector import RollerVectorEnv
 from roller_env.game.actions import DIRECTIONS, forces
+from roller_env.lab.cuda.compiler import cuda, numba
 from roller_env.lab.cuda.games import CudaGames, Player
 from roller_env.simulation import Simulation
 
@@ -109,7 +109,6 @@ class Speed:
 
 def card_speeds(player: Player, sizes: Sequence[int], seconds: float) -> Iterator[Speed]:
     """Yield how fast a card plays with random actions, drawn there, resets included."""
-    name = cuda.get_current_device().name
     for envs in sizes:
         games = CudaGames(player, envs)
 
@@ -117,19 +116,19 @@ def card_speeds(player: Player, sizes: Sequence[int], seconds: float) -> Iterato
             games.draw()
             games.step()
 
-        yield _timed(_text(name), 0, envs, step, seconds, cuda.synchronize)
+        yield _timed(_name(), 0, envs, step, seconds, cuda.synchronize)
 
 
-def cpu_speeds(config: EnvConfig, seconds: float, ready: Callable[[], None]) -> Iterator[Speed]:
+def cpu_speeds(asked: EnvConfig, seconds: float, ready: Callable[[], None]) -> Iterator[Speed]:
     """Yield how fast the vector environment plays on 1, 2, 4, ... threads, resets included.
 
     Args:
-        config: options of the envs.
+        asked: options of the envs.
         seconds: of timing, of each.
         ready: called before the first timing, when everything is compiled.
     """
     cores, threads = os.cpu_count() or 1, 1
-    options = {"level": config.level, "physics": config.physics, "reward": config.reward}
+    options = {name: getattr(asked, name) for name in ("level", "physics", "reward")}
     while threads <= cores:
         envs = RollerVectorEnv(_CPU_ENVS, num_threads=threads, **options)
         envs.reset(seed=0)
@@ -168,5 +167,9 @@ def _timed(
     return Speed(device, threads, envs, steps, taken, steps * envs / taken)
 
 
-def _text(name: str | bytes) -> str:
-    return name.decode() if isinstance(name, bytes) else name
+def _name() -> str:
+    """Return the card's name."""
+    if numba.config.ENABLE_CUDASIM:
+        return "simulator"
+    name = cuda.get_current_device().name
+    return name.decode() if isinstance(name, bytes) else str(name)

@@ -71,9 +71,8 @@ def gather(
         left: seconds.
     """
     work.found = 0
-    # Numba for CUDA takes a floor for a float.
-    x = int(math.floor((position[0] - level.origin[0]) / level.cell))
-    y = int(math.floor((position[1] - level.origin[1]) / level.cell))
+    x = int(math.floor((position[0] - level.origin[0]) / level.cell))  # noqa: RUF046 - CUDA's
+    y = int(math.floor((position[1] - level.origin[1]) / level.cell))  # noqa: RUF046 - is a float.
     if not (0 <= x < level.grid[0] and 0 <= y < level.grid[1]):
         return
     cell = level.first_cell + x * level.grid[1] + y

@@ -1,12 +1,12 @@
 """Play whole games on a graphics card, one thread an env, by the kernels that the CPU runs.
 
-Needs ``numba-cuda`` with NVIDIA's compiler (``pip install 'numba-cuda[cu13]'``), which no other part
+Needs ``numba-cuda`` with NVIDIA's compiler (``pip install 'numba-cuda[cu13]'``), as no other part
 of Roller does.
 
 Examples::
 
-    python scripts/cuda.py --ptx              # compile for an H100; no card is needed
-    python scripts/cuda.py                    # is a card right, and how fast is it? two minutes
+    python scripts/gpu.py --ptx              # compile for an H100; no card is needed
+    python scripts/gpu.py                    # is a card right, and how fast is it? two minutes
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import csv
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Literal
@@ -80,8 +80,7 @@ def main(arguments: Arguments) -> None:
     if arguments.ptx:
         _compile(config)
         return
-    beside = _beside(arguments) if arguments.cpu == "beside" else None
-    _play(config, arguments, beside)
+    _play(config, arguments)
 
 
 def _compile(config: EnvConfig) -> None:
@@ -93,10 +92,8 @@ def _compile(config: EnvConfig) -> None:
     games = player.host_games(count=8)
     force_n = np.zeros((8, 2), order="F")
     choices, out = np.zeros((9, 2)), np.zeros((8, player.entries), np.float32, order="F")
-    for name, given in {
-        "step": (games, force_n, out),
-        "draw": (games.random, choices, force_n),
-    }.items():
+    arguments = {"step": (games, force_n, out), "draw": (games.random, choices, force_n)}
+    for name, given in arguments.items():
         begun = time.perf_counter()
         with as_written():
             ptx = ptx_of(player.kernels[name], given)
@@ -109,11 +106,12 @@ def _compile(config: EnvConfig) -> None:
         )
 
 
-def _play(config: EnvConfig, arguments: Arguments, beside: subprocess.Popen[str] | None) -> None:
+def _play(config: EnvConfig, arguments: Arguments) -> None:
     """Compare a card with the CPU, and time both."""
     from roller_env.lab.cuda.games import CudaGames, Player
     from roller_env.lab.cuda.measure import Speed, agreement, card_speeds
 
+    beside = _beside(arguments) if arguments.cpu == "beside" else None
     begun = time.perf_counter()
     player = Player(config, arguments.registers)
     games = CudaGames(player, 64)
@@ -121,12 +119,15 @@ def _play(config: EnvConfig, arguments: Arguments, beside: subprocess.Popen[str]
     games.step()
     games.state()
     _say(f"compiled for the card in {time.perf_counter() - begun:.1f} s")
+    if beside is not None and beside.stdout is not None:
+        beside.stdout.readline()  # It has compiled, and what it has is kept for this process too.
+        _say(f"and for the CPU after {time.perf_counter() - begun:.1f} s")
     for compared in agreement(player, arguments.compared, arguments.after):
         _say(
             f"after {compared.steps} steps: of {compared.envs} games {compared.played} are in "
             f"their first episode on both; {compared.same} of these are the same to the bit, of "
-            f"{compared.other_rules} the rules' state differs; the balls are {compared.mean_m:.2e} m "
-            f"apart in the mean and {compared.largest_m:.2e} m at most"
+            f"{compared.other_rules} the rules' state differs; the balls are "
+            f"{compared.mean_m:.2e} m apart in the mean and {compared.largest_m:.2e} m at most"
         )
     names = [field.name for field in fields(Speed)]
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
@@ -155,13 +156,10 @@ def _beside(arguments: Arguments) -> subprocess.Popen[str]:
     )
 
 
-def _cpu_rows(beside: subprocess.Popen[str] | None, names: list[str]) -> Iterable[dict[str, str]]:
+def _cpu_rows(beside: subprocess.Popen[str] | None, names: list[str]) -> Iterator[dict[str, str]]:
     """Have the CPU timed, while nothing else is done; yield its rows."""
-    if beside is None:
+    if beside is None or beside.stdin is None or beside.stdout is None:
         return
-    assert beside.stdin is not None
-    assert beside.stdout is not None
-    beside.stdout.readline()  # It is ready.
     beside.stdin.write("go\n")
     beside.stdin.flush()
     for line in beside.stdout:
@@ -190,7 +188,8 @@ def _number(value: object) -> str:
 
 def _line(row: dict[str, str]) -> str:
     threads = f"{row['threads']} threads, " if row["threads"] != "0" else ""
-    return f"{row['device']}: {threads}{int(row['envs']):,} envs: {float(row['steps_per_s']):,.0f} steps/s"
+    speed = f"{float(row['steps_per_s']):,.0f} environment steps a second"
+    return f"{row['device']}: {threads}{int(row['envs']):,} envs: {speed}"
 
 
 def _say(what: str) -> None:
