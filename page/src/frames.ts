@@ -84,7 +84,9 @@ export class FrameBuffer {
     for (const after of this.frames) {
       if (after.clockS > this.playhead) {
         const length = after.clockS - before.clockS;
-        return length > 0 ? between(before, after, (this.playhead - before.clockS) / length) : after;
+        return length > 0
+          ? between(before, after, (this.playhead - before.clockS) / length)
+          : after;
       }
       before = after;
     }
