@@ -22,13 +22,14 @@ from roller_env.arrays import Bool, Float64
 from roller_env.compile.merge import merge_solids
 from roller_env.compile.mjcf import quaternion
 from roller_env.game.state import GameState
+from roller_env.game.tables import LevelTable
 from roller_env.level.expand import expand, shapes
 from roller_env.level.schema import Level
-from roller_env.level.text import level_text
 from roller_env.pieces.coin import coin_shapes
 from roller_env.pieces.look import METAL, Paint, Shape
 from roller_env.pieces.piece import Mover, Piece, Solid, number_of
 from roller_env.pieces.surfaces import Surface, solid_surfaces
+from roller_env.replay.contents import canonical_text
 
 FORMAT: Final = 1
 
@@ -68,15 +69,17 @@ class Scene:
         level: the level.
         hash: of all that the scene is made of; scenes with the same one are the same.
         machines: the pieces of which frames tell the phase.
-        movers: how many slabs frames tell the displacement of.
+        coins: how many there are.
+        slots: of each of the level's movers, which slab of the simulation's it is.
     """
 
     def __init__(self, level: Level):
         """Find what is to be seen of ``level``."""
         everything = expand(level)
         self.level = level
-        self.hash = hashlib.sha256(f"{FORMAT} {level_text(level)}".encode()).hexdigest()[:16]
-        self.movers = len(everything.movers)
+        self.hash = hashlib.sha256(f"{FORMAT} {canonical_text(level)}".encode()).hexdigest()[:16]
+        self.coins = len(everything.coins)
+        self.slots = LevelTable.of_levels([level]).slots([level])[0]
         self.machines: list[Machine] = []
         self._machine_of: dict[str, int] = {}
         self._mover_of = {mover.name: i for i, mover in enumerate(everything.movers)}
@@ -117,6 +120,7 @@ class Scene:
             [np.array([level.start.at]), *(solid.corners() for solid in everything.at_the_start)]
         )
         paints = {paint.name: paint for shape in shapes(level) for paint in shape.paints}
+        paints[METAL.name] = METAL
         return {
             "format": FORMAT,
             "name": level.name,
@@ -124,7 +128,7 @@ class Scene:
             "description": level.description,
             "hash": self.hash,
             "par_time_s": level.par_time_s,
-            "coins": len(everything.coins),
+            "coins": self.coins,
             "ball_radius": level.ball.radius,
             "start": list(level.start.at),
             "low": corners.min(axis=0).tolist(),
@@ -133,7 +137,9 @@ class Scene:
                 name: {"colour": material.colour, "pattern": material.pattern}
                 for name, material in self._materials().items()
             },
-            "paints": {name: _paint(paint) for name, paint in {METAL.name: METAL, **paints}.items()},
+            "paints": {
+                name: _paint(paint) for name, paint in {METAL.name: METAL, **paints}.items()
+            },
             "surfaces": surfaces.data,
             "ground": ground,
             "movers": [{"name": m.name, "along": list(m.along)} for m in everything.movers],
