@@ -15,7 +15,7 @@ export class Hints {
   /** Show the hint that fits what the player has and has not done yet. */
   update({ frame, hello, level, scene, seat }: View): void {
     const row = hello?.levels.find(({ name }) => name === level?.name);
-    const first = row?.number === 1 || row?.name === "classic";
+    const first = hello?.mode === "play" && (row?.number === 1 || row?.name === "classic");
     const shown = !this.done && first && seat === "player" && frame?.phase === "playing";
     if (frame?.outcome === "finish" && seat === "player") this.finish();
     setShown(this.element, shown && scene !== null && !frame.agentPlays);

@@ -76,8 +76,8 @@ export class Hud {
     this.show("pause", seat === "player");
     this.show("research", hello !== null && (hello.mode !== "watch" || frame.hasAgent));
     const { mute } = this.buttons;
-    if (mute && mute.dataset["muted"] !== String(settings.muted)) {
-      mute.dataset["muted"] = String(settings.muted);
+    if (mute && mute.dataset.muted !== String(settings.muted)) {
+      mute.dataset.muted = String(settings.muted);
       mute.replaceChildren(drawIcon(settings.muted ? "mute" : "sound"));
       mute.title = settings.muted ? "Sound on (M)" : "Sound off (M)";
       setAttribute(mute, "aria-label", mute.title);

@@ -134,10 +134,10 @@ export class Ui {
     this.settings.show(this.opened === "settings");
     this.help.show(this.opened === "help");
     const top = this.top();
-    // The start page covers the rest; what a person opened is above all.
     const panels = [this.start, this.pause, this.end, this.settings, this.help];
     for (const panel of panels) setInert(panel.element, top !== null && panel !== top);
-    setInert(this.below, this.opened !== null || base === "start");
+    // Who watches is told that at the end, too, and may ask for the controls.
+    setInert(this.below, this.opened !== null || (top !== null && this.view?.seat === "player"));
   }
 
   private top(): Dialog | null {

@@ -15,7 +15,7 @@ export class Intro {
   private readonly skip: HTMLButtonElement;
 
   constructor(actions: Actions) {
-    this.skip = button("Begin at once", "main", () => actions.send({ type: "skip" }));
+    this.skip = button("Begin", "main", () => actions.send({ type: "skip" }));
     this.element = make(
       "section",
       { class: "panel intro", "aria-label": "The level" },

@@ -8,19 +8,19 @@ import { button, make, setShown } from "./dom";
 /** Settings that are chosen from a list, with what their values are called. */
 const CHOICES = {
   keys: [
-    ["world", "the level: W is always the same way"],
-    ["camera", "the camera: W is away from you"],
+    ["world", "the level"],
+    ["camera", "the camera"],
   ],
   camera: [
-    ["follow", "follows the ball's way"],
-    ["orbit", "orbit: drag, and turn the wheel"],
-    ["game", "as the level asks for"],
-    ...CAMERA_NAMES.map((name, number) => [String(number), `always ${name}`] as const),
+    ["follow", "follow the ball"],
+    ["orbit", "orbit: drag it"],
+    ["game", "as in the original"],
+    ...CAMERA_NAMES.map((name, number) => [String(number), name] as const),
   ],
   quality: [
-    ["auto", "as fast as it can be smooth"],
+    ["auto", "automatic"],
     ["high", "high"],
-    ["low", "low: without a graphics processor"],
+    ["low", "low"],
   ],
 } as const;
 const LABELS = { keys: "Keys push along", camera: "Camera", quality: "Picture" };

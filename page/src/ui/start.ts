@@ -87,8 +87,14 @@ export class StartPage extends Dialog {
     if (level !== null && this.waiting === 0 && level.name !== this.chosen) {
       this.chosen = level.name;
       this.mark();
-      this.cardOf(level.name)?.scrollIntoView({ block: "nearest" });
+      this.scrollToChosen();
     }
+  }
+
+  override show(shown: boolean): void {
+    const opens = shown && !this.isShown;
+    super.show(shown);
+    if (opens) this.scrollToChosen();
   }
 
   /** Choose a level beside the chosen one; `rows` is how many rows of cards further down. */
@@ -98,9 +104,8 @@ export class StartPage extends Dialog {
     const row = this.levels[now + columns + rows * wide];
     if (row === undefined) return;
     this.choose(row.name);
-    const card = this.cardOf(row.name);
-    card?.scrollIntoView({ block: "nearest" });
-    if (this.cards.contains(document.activeElement)) card?.focus({ preventScroll: true });
+    this.scrollToChosen();
+    if (this.cards.contains(document.activeElement)) this.cardOf(row.name)?.focus();
   }
 
   /** Begin the chosen level. */
@@ -130,7 +135,7 @@ export class StartPage extends Dialog {
     const best = row.best_time_s === null ? "not yet won" : formatTime(row.best_time_s);
     const coins = row.best_coins === null ? `${row.coins}` : `${row.best_coins}/${row.coins}`;
     const card = button("", "card", () => undefined);
-    card.dataset["level"] = row.name;
+    card.dataset.level = row.name;
     card.setAttribute("aria-label", describe(row));
     card.append(
       picture,
@@ -157,10 +162,14 @@ export class StartPage extends Dialog {
     return this.cards.querySelector(`[data-level="${CSS.escape(name)}"]`);
   }
 
+  private scrollToChosen(): void {
+    if (this.chosen !== null) this.cardOf(this.chosen)?.scrollIntoView({ block: "nearest" });
+  }
+
   /** Show which level is chosen. */
   private mark(): void {
     for (const card of this.cards.querySelectorAll<HTMLElement>(".card")) {
-      setAttribute(card, "aria-pressed", String(card.dataset["level"] === this.chosen));
+      setAttribute(card, "aria-pressed", String(card.dataset.level === this.chosen));
     }
     const row = this.levels.find((one) => one.name === this.chosen);
     if (row === undefined) return;
