@@ -5,6 +5,8 @@ import { Page, rootElement } from "./page";
 import type { Frame, Phase, ResultMessage, Scene, ToServer } from "./types";
 import { decodeFrame } from "./wire";
 
+const POINTS_PER_COIN = 10;
+
 /** What the HTML round this script has put there. */
 interface Recorded {
   /** base64 of gzip of the scene's JSON. */
@@ -14,7 +16,7 @@ interface Recorded {
   frame_bytes: number;
   rate_hz: number;
   title: string;
-  result: Omit<ResultMessage, "type"> | null;
+  result: Pick<ResultMessage, "outcome" | "coins" | "time_s">;
 }
 
 declare global {
@@ -26,6 +28,7 @@ declare global {
 class Replay {
   private readonly page: Page;
   private readonly lastS: number;
+  private readonly result: ResultMessage;
   private placeS = 0;
   private speed = 1;
   private playing = true;
@@ -58,7 +61,14 @@ class Replay {
     view.seat = "player";
     view.connection = "open";
     const name = scene.name;
-    view.level = { type: "level", name, scene: "", control_dt_s: 1 / 60, points_per_coin: 10 };
+    view.level = {
+      type: "level",
+      name,
+      scene: "",
+      control_dt_s: 1 / recorded.rate_hz,
+      points_per_coin: POINTS_PER_COIN,
+    };
+    this.result = resultOf(recorded, scene);
     view.timeline = { type: "timeline", first_s: 0, last_s: this.lastS, can_branch: false };
     document.title = recorded.title;
     this.page.show(scene);
@@ -79,9 +89,7 @@ class Replay {
       speed: this.speed,
     };
     this.page.view.frame = frame;
-    const { result } = this.recorded;
-    this.page.view.result =
-      frame.phase === "ended" && result ? { type: "result", ...result } : null;
+    this.page.view.result = frame.phase === "ended" ? this.result : null;
     return frame;
   }
 
@@ -118,6 +126,21 @@ class Replay {
         this.go(this.placeS + 1 / this.recorded.rate_hz);
     }
   }
+}
+
+function resultOf({ result }: Recorded, scene: Scene): ResultMessage {
+  return {
+    type: "result",
+    ...result,
+    coins_in_level: scene.coins,
+    score_percent: scene.coins > 0 ? (100 * result.coins) / scene.coins : 0,
+    points: POINTS_PER_COIN * result.coins,
+    medal: null,
+    best_time: false,
+    best_coins: false,
+    counts: false,
+    next: null,
+  };
 }
 
 async function unpack(base64: string): Promise<ArrayBuffer> {
