@@ -56,7 +56,8 @@ export class Input {
   /** Look at the gamepad, and follow the camera's turns; once for each frame drawn. */
   update(view: View): void {
     this.view = view;
-    this.stick.enable(this.steers() && isTouched(), view.settings.camera === "orbit");
+    const drawn = this.steers() && view.frame?.phase !== "paused" && isTouched();
+    this.stick.enable(drawn, view.settings.camera === "orbit");
     this.readPad();
     this.tell();
   }

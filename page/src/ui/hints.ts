@@ -48,7 +48,7 @@ export function hintFor(frame: Frame, start: readonly number[], touched: boolean
       : "W A S D or the arrow keys push the ball";
   }
   if (frame.coins === 0) return "Roll through the coins: ten points each";
-  return "Now the finish, and do not fall: let go of the keys in time to brake";
+  return "Let go of the keys in time, or you fall. The finish ends the game";
 }
 
 function stored(): boolean {

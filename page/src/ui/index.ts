@@ -31,11 +31,11 @@ export type Base = "start" | "pause" | "end" | null;
  * @param before - the one of the moment before; the start page stays while a level is loaded.
  */
 export function baseOf(view: View, research: boolean, before: Base): Base {
-  const { hello, seat, frame, level, result } = view;
+  const { hello, seat, frame, level } = view;
   if (hello === null || hello.mode === "replay") return null;
   const choosing = frame === null ? level === null || before === "start" : frame.phase === "start";
   if (frame === null || choosing) return choosing && seat === "player" ? "start" : null;
-  if (frame.phase === "ended") return result === null ? null : "end";
+  if (frame.phase === "ended") return "end";
   return frame.phase === "paused" && seat === "player" && !research ? "pause" : null;
 }
 
@@ -120,9 +120,10 @@ export class Ui {
     this.connection.update(view, base === "start");
     this.seat.update(view);
     this.problems.update(view);
-    const inGame = view.frame !== null && view.frame.phase !== "start";
-    this.researchPanel.update(view, research && inGame && view.hello?.mode !== "replay");
-    this.timeline.update(view, research && inGame && view.frame?.phase !== "ended");
+    const replay = view.hello?.mode === "replay";
+    const inGame = view.frame !== null && base !== "start" && base !== "end";
+    this.researchPanel.update(view, research && inGame && (!replay || view.agent !== null));
+    this.timeline.update(view, research && inGame);
     this.showPanels();
   }
 
@@ -194,6 +195,7 @@ export class Ui {
     const phase = view.frame?.phase;
     if (this.opened !== null) this.open(null);
     else if (phase === "paused") this.ask(view, "resume");
+    else if (phase === "ended" && view.hello?.mode === "replay") this.ask(view, "restart");
     else if (phase === "playing" || phase === "intro") this.ask(view, "pause");
   }
 

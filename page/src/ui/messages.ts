@@ -7,7 +7,6 @@ import { counted } from "./format";
 
 const FALL_MS = 2000;
 const CAMERA_MS = 1600;
-const NOTICE_MS = 6000;
 
 /** A line that goes after a while. */
 class Passing {
@@ -33,15 +32,14 @@ export class Messages {
   readonly element: HTMLElement;
   private readonly fall = new Passing("fall", "alert");
   private readonly camera = new Passing("camera");
-  private readonly notice = new Passing("notice");
+  private readonly notice = make("p", { class: "panel notice", role: "status", hidden: "" });
   private readonly agent = make("p", { class: "panel agent-line", hidden: "" });
   private readonly told = make("p", { class: "for-readers", "aria-live": "polite" });
   private before: Frame | null = null;
   private cameraBefore = "";
-  private noticeBefore: string | null = null;
 
   constructor() {
-    const top = make("div", { class: "messages" }, this.agent, this.notice.element);
+    const top = make("div", { class: "messages" }, this.agent, this.notice);
     top.append(this.camera.element, this.fall.element);
     this.element = make("div", {}, top, this.told);
   }
@@ -54,10 +52,8 @@ export class Messages {
    */
   update(view: View, now: number): void {
     const { frame, settings, notice, hello } = view;
-    if (notice !== this.noticeBefore) {
-      this.noticeBefore = notice;
-      if (notice !== null) this.notice.say(notice, NOTICE_MS, now);
-    }
+    setShown(this.notice, notice !== null);
+    if (notice !== null) setText(this.notice, notice);
     if (frame !== null) {
       if (this.before !== null && frame.falls > this.before.falls) {
         this.fall.say("You fell. Once more!", FALL_MS, now);
@@ -74,7 +70,7 @@ export class Messages {
     const moving = frame?.phase === "playing" && frame.hasAgent && hello?.mode !== "replay";
     setShown(this.agent, moving === true);
     if (moving) setText(this.agent, agentLine(view));
-    for (const one of [this.fall, this.camera, this.notice]) one.update(now);
+    for (const one of [this.fall, this.camera]) one.update(now);
   }
 }
 

@@ -11,12 +11,14 @@ import {
   MeshBasicMaterial,
   MeshLambertMaterial,
   MeshStandardMaterial,
+  NoColorSpace,
   Quaternion,
   SphereGeometry,
   SRGBColorSpace,
   Vector3,
 } from "three";
 import type { Frame } from "../types";
+import { SimpleMaterial } from "./simple";
 import type { Solids } from "./solids";
 
 const RED = "#e63329";
@@ -38,7 +40,8 @@ const Z = new Vector3(0, 0, 1);
 
 export class Balls {
   readonly group = new Group();
-  private readonly ball: Mesh<SphereGeometry, MeshLambertMaterial | MeshStandardMaterial>;
+  private readonly ball: Mesh<SphereGeometry, SimpleMaterial | MeshStandardMaterial>;
+  private readonly pattern: CanvasTexture;
   private readonly ghost: Mesh<SphereGeometry, MeshLambertMaterial>;
   private readonly crowd: InstancedMesh<SphereGeometry, MeshLambertMaterial>;
   private readonly shadow: Mesh<CircleGeometry, MeshBasicMaterial>;
@@ -56,12 +59,13 @@ export class Balls {
   ) {
     // Of three's sphere the poles are on y, of the ball on z.
     const sphere = new SphereGeometry(radius, 48, 32).rotateX(Math.PI / 2);
-    const map = beachBall();
+    this.pattern = beachBall();
+    this.pattern.colorSpace = rich ? SRGBColorSpace : NoColorSpace;
     this.ball = new Mesh(
       sphere,
       rich
-        ? new MeshStandardMaterial({ map, roughness: 0.28, envMapIntensity: 0.55 })
-        : new MeshLambertMaterial({ map, emissive: 0x202020 }),
+        ? new MeshStandardMaterial({ map: this.pattern, roughness: 0.28, envMapIntensity: 0.55 })
+        : new SimpleMaterial([1, 1, 1], 1, 0.1, this.pattern),
     );
     this.ball.castShadow = true;
     this.ghost = new Mesh(sphere, glassy("#cfe8ff", 0.42));
@@ -106,9 +110,10 @@ export class Balls {
   dispose(): void {
     for (const mesh of [this.ball, this.ghost, this.crowd, this.shadow]) {
       mesh.geometry.dispose();
-      mesh.material.map?.dispose();
       mesh.material.dispose();
     }
+    this.pattern.dispose();
+    this.shadow.material.map?.dispose();
     this.crowd.dispose();
   }
 
@@ -173,7 +178,6 @@ function beachBall(): CanvasTexture {
     context.fillRect(0, top === 0 ? cap - 5 : top - 5, width, 10);
   }
   const texture = new CanvasTexture(canvas);
-  texture.colorSpace = SRGBColorSpace;
   texture.anisotropy = 4;
   return texture;
 }

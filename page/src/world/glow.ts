@@ -31,7 +31,6 @@ const FRAGMENT = /* glsl */ `
     float core = 1.0 - smoothstep(0.0, 0.22, r);
     float fall = 1.0 - r;
     gl_FragColor = vec4(mix(shine.rgb, vec3(1.0), core), shine.a * fall * (0.55 + 0.45 * core));
-    #include <colorspace_fragment>
   }
 `;
 
@@ -68,7 +67,7 @@ export class Glows {
     this.count = 0;
   }
 
-  /** Add a light: its centre and radius, metres, colour of linear light, and opacity, 0 to 1. */
+  /** Add a light: its centre and radius, metres, colour as seen, and opacity, 0 to 1. */
   add(
     x: number,
     y: number,

@@ -4,11 +4,10 @@ import {
   AmbientLight,
   DirectionalLight,
   HemisphereLight,
-  PCFSoftShadowMap,
+  PCFShadowMap,
   PerspectiveCamera,
   PMREMGenerator,
   Vector3,
-  type WebGLCubeRenderTarget,
   WebGLRenderer,
   type WebGLRenderTarget,
   Scene as World3,
@@ -23,7 +22,7 @@ import { Labels } from "./labels";
 import { Paints } from "./paint";
 import { Quality } from "./quality";
 import { Scenery } from "./scenery";
-import { paintSky } from "./sky";
+import { paintSky, skyMesh } from "./sky";
 import { Solids } from "./solids";
 
 export type CameraChoice = Settings["camera"];
@@ -33,6 +32,7 @@ const FIELD_OF_VIEW = 65;
 const LEAST_WIDTH_OF_VIEW = 60;
 
 const SUN = new Vector3(0.42, -0.3, -0.86).normalize();
+const TOWARDS_SUN = SUN.clone().negate();
 const SUN_DISTANCE_M = 30;
 /** Half edge of the square round the ball in which the sun casts shadows. */
 const SHADOW_REACH_M = 14;
@@ -45,10 +45,7 @@ export class World {
   private readonly renderer: WebGLRenderer;
   private readonly world = new World3();
   private readonly camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.1, 1000);
-  private readonly sun = new DirectionalLight();
-  private readonly skyLight = new HemisphereLight();
-  private readonly fill = new AmbientLight();
-  private readonly sky: WebGLCubeRenderTarget;
+  private readonly sun = new DirectionalLight("#fff1dc", 2.5);
   private environment: WebGLRenderTarget | null = null;
   private readonly software: boolean;
   private readonly quality: Quality;
@@ -71,12 +68,13 @@ export class World {
       antialias: !this.software,
       powerPreference: "high-performance",
     });
-    this.renderer.shadowMap.type = PCFSoftShadowMap;
+    this.renderer.shadowMap.type = PCFShadowMap;
     this.camera.up.set(0, 0, 1);
-    this.sky = paintSky(this.renderer, SUN.clone().negate());
-    this.world.background = this.sky.texture;
     this.setSun();
-    this.world.add(this.sun, this.sun.target, this.skyLight, this.fill);
+    this.world.add(skyMesh(paintSky(this.renderer, TOWARDS_SUN, false)));
+    const skyLight = new HemisphereLight("#cfe3ff", "#8fa3bd", 0.75);
+    skyLight.position.set(0, 0, 1);
+    this.world.add(this.sun, this.sun.target, skyLight, new AmbientLight("#ffffff", 0.35));
     this.orbit = new OrbitCamera(
       canvas,
       () => {
@@ -176,14 +174,15 @@ export class World {
     this.parts?.dispose();
     const { rich } = this.quality.effort;
     if (rich && this.environment === null) {
+      const sky = paintSky(this.renderer, TOWARDS_SUN, true);
       const generator = new PMREMGenerator(this.renderer);
-      this.environment = generator.fromCubemap(this.sky.texture);
+      this.environment = generator.fromCubemap(sky.texture);
       generator.dispose();
+      sky.dispose();
     }
     this.world.environment = rich ? (this.environment?.texture ?? null) : null;
     this.renderer.shadowMap.enabled = rich;
     this.sun.castShadow = rich;
-    this.setLights(rich);
     const anisotropy = rich ? Math.min(this.renderer.capabilities.getMaxAnisotropy(), 8) : 1;
     this.parts = new Parts(scene, rich, anisotropy, this.world);
   }
@@ -202,17 +201,6 @@ export class World {
       near: 1,
       far: 3 * SUN_DISTANCE_M,
     });
-  }
-
-  private setLights(rich: boolean): void {
-    this.sun.color.set("#fff1dc");
-    this.sun.intensity = rich ? 2.4 : 2.1;
-    this.skyLight.color.set("#cfe3ff");
-    this.skyLight.groundColor.set("#8fa3bd");
-    this.skyLight.position.set(0, 0, 1);
-    this.skyLight.intensity = rich ? 0.75 : 1.0;
-    this.fill.color.set("#ffffff");
-    this.fill.intensity = rich ? 0.35 : 0.55;
   }
 
   /** Let the sun cast its shadows round the ball. */

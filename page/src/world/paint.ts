@@ -5,15 +5,18 @@ import {
   Color,
   DataTexture,
   DoubleSide,
+  FrontSide,
   LinearFilter,
   LinearMipmapLinearFilter,
+  LinearMipmapNearestFilter,
   type Material,
-  MeshLambertMaterial,
   MeshStandardMaterial,
+  NoColorSpace,
   RepeatWrapping,
   SRGBColorSpace,
 } from "three";
 import type { Material as LevelMaterial, Paint, Scene } from "../types";
+import { SimpleMaterial } from "./simple";
 
 type Rgb = readonly [number, number, number];
 
@@ -30,9 +33,23 @@ const EDGE_SHADES: readonly (readonly [number, number])[] = [
   [1, 0.34],
 ];
 
-/** How tiles and bodies reflect the sky, where it is reflected at all. */
+const WHITE: Rgb = [1, 1, 1];
+
+/** How the sky is reflected, where it is reflected at all. */
 const FLOOR_ROUGHNESS = 0.55;
+const EDGE_ROUGHNESS = 0.7;
+const GLASS_ROUGHNESS = 0.08;
 const ENVIRONMENT_SHARE = 0.35;
+
+interface Look {
+  colour: Rgb;
+  /** Opacity of a face. */
+  alpha: number;
+  map: DataTexture | null;
+  roughness: number;
+  emission?: number;
+  metalness?: number;
+}
 
 /** The materials of a scene, each made once. */
 export class Paints {
@@ -83,70 +100,62 @@ export class Paints {
 
   private tiles({ colour, pattern }: LevelMaterial): Material {
     const { rgb, alpha } = parseColour(colour);
-    const material = this.plain({
-      colour: pattern === "plain" ? rgb : [1, 1, 1],
+    return this.body({
+      colour: pattern === "plain" ? rgb : WHITE,
       alpha: faceAlpha(alpha),
-      roughness: alpha < 1 ? 0.08 : FLOOR_ROUGHNESS,
+      map: pattern === "plain" ? null : this.texture(TILE_PIXELS, tilePixels(rgb, pattern)),
+      roughness: alpha < 1 ? GLASS_ROUGHNESS : FLOOR_ROUGHNESS,
     });
-    if (pattern !== "plain") material.map = this.texture(TILE_PIXELS, tilePixels(rgb, pattern));
-    return material;
   }
 
   private rim({ colour }: LevelMaterial): Material {
     const { rgb, alpha } = parseColour(colour);
-    const material = this.plain({ colour: [1, 1, 1], alpha: faceAlpha(alpha), roughness: 0.7 });
-    material.map = this.texture(4, rimPixels(rgb, 4));
-    material.map.wrapT = ClampToEdgeWrapping;
-    return material;
+    const map = this.texture(4, rimPixels(rgb, 4));
+    map.wrapT = ClampToEdgeWrapping;
+    return this.body({ colour: WHITE, alpha: faceAlpha(alpha), map, roughness: EDGE_ROUGHNESS });
   }
 
   private paint(name: string): Material {
     const paint: Paint | undefined = this.scene.paints[name];
     if (paint === undefined) throw new RangeError(`the scene has no paint ${name}`);
     const { rgb, alpha } = parseColour(paint.colour);
-    const material = this.plain({
+    return this.body({
       colour: rgb,
       alpha: paint.opacity < 1 ? faceAlpha(paint.opacity) : alpha,
+      map: paint.texture === "chequers" ? this.texture(64, chequeredPixels(64)) : null,
+      emission: paint.emission,
       roughness: 1 - 0.8 * paint.shininess,
       metalness: paint.specular > 0.5 ? 0.6 : 0,
     });
-    if (paint.texture === "chequers") material.map = this.texture(64, chequeredPixels(64));
-    material.emissive = new Color().setRGB(...rgb, SRGBColorSpace);
-    material.emissiveMap = material.map;
-    material.emissiveIntensity = paint.emission;
-    return material;
   }
 
-  private plain(look: {
-    colour: Rgb;
-    alpha: number;
-    roughness: number;
-    metalness?: number;
-  }): MeshLambertMaterial | MeshStandardMaterial {
-    const seenThrough = look.alpha < 1;
-    const common = {
-      color: new Color().setRGB(...look.colour, SRGBColorSpace),
-      opacity: look.alpha,
+  private body({ colour, alpha, map, roughness, emission = 0, metalness = 0 }: Look): Material {
+    if (!this.rich) return new SimpleMaterial(colour, alpha, emission, map);
+    const color = new Color().setRGB(...colour, SRGBColorSpace);
+    const seenThrough = alpha < 1;
+    return new MeshStandardMaterial({
+      color,
+      map,
+      emissive: color,
+      emissiveMap: map,
+      emissiveIntensity: emission,
+      roughness,
+      metalness,
+      envMapIntensity: ENVIRONMENT_SHARE,
+      opacity: alpha,
       transparent: seenThrough,
       // What is behind glass is seen through both of its sides.
       depthWrite: !seenThrough,
-      ...(seenThrough && { side: DoubleSide }),
-    };
-    if (!this.rich) return new MeshLambertMaterial(common);
-    return new MeshStandardMaterial({
-      ...common,
-      roughness: look.roughness,
-      metalness: look.metalness ?? 0,
-      envMapIntensity: ENVIRONMENT_SHARE,
+      side: seenThrough ? DoubleSide : FrontSide,
     });
   }
 
   private texture(width: number, pixels: Uint8Array<ArrayBuffer>): DataTexture {
     const texture = new DataTexture(pixels, width, pixels.length / 4 / width);
-    texture.colorSpace = SRGBColorSpace;
+    texture.colorSpace = this.rich ? SRGBColorSpace : NoColorSpace;
     texture.wrapS = texture.wrapT = RepeatWrapping;
     texture.magFilter = LinearFilter;
-    texture.minFilter = LinearMipmapLinearFilter;
+    texture.minFilter = this.rich ? LinearMipmapLinearFilter : LinearMipmapNearestFilter;
     texture.generateMipmaps = true;
     texture.anisotropy = this.anisotropy;
     texture.needsUpdate = true;

@@ -2,23 +2,25 @@
 
 import {
   BackSide,
+  BoxGeometry,
   CubeCamera,
   HalfFloatType,
-  LinearMipmapLinearFilter,
   Mesh,
   Scene,
   ShaderMaterial,
-  SphereGeometry,
+  UnsignedByteType,
   type Vector3,
   WebGLCubeRenderTarget,
   type WebGLRenderer,
 } from "three";
 
 const PIXELS = 512;
+const REFLECTED_PIXELS = 128;
 
 const FRAGMENT = /* glsl */ `
   varying vec3 direction;
   uniform vec3 towardsSun;
+  uniform bool linear;
 
   float hash(vec2 p) {
     vec3 q = fract(vec3(p.xyx) * 0.1031);
@@ -67,8 +69,8 @@ const FRAGMENT = /* glsl */ `
     sky = mix(sky, cloud, 0.85 * cover);
     float sun = max(dot(look, towardsSun), 0.0);
     sky += vec3(1.0, 0.93, 0.78) * (0.22 * pow(sun, 24.0) + smoothstep(0.9993, 0.9997, sun));
-    // Colours above are as seen; the renderer wants light.
-    gl_FragColor = vec4(pow(min(sky, 1.0), vec3(2.2)), 1.0);
+    // Colours above are as seen.
+    gl_FragColor = vec4(linear ? pow(min(sky, 1.0), vec3(2.2)) : sky, 1.0);
   }
 `;
 
@@ -80,24 +82,65 @@ const VERTEX = /* glsl */ `
   }
 `;
 
-/** Paint the sky. */
-export function paintSky(renderer: WebGLRenderer, towardsSun: Vector3): WebGLCubeRenderTarget {
-  const target = new WebGLCubeRenderTarget(PIXELS, {
-    type: HalfFloatType,
-    generateMipmaps: true,
-    minFilter: LinearMipmapLinearFilter,
+const SEEN_VERTEX = /* glsl */ `
+  varying vec3 direction;
+  void main() {
+    direction = position;
+    gl_Position = projectionMatrix * vec4(mat3(viewMatrix) * position, 1.0);
+    // Behind everything, so that only what is seen of it is drawn.
+    gl_Position.z = gl_Position.w;
+  }
+`;
+
+const SEEN_FRAGMENT = /* glsl */ `
+  uniform samplerCube sky;
+  varying vec3 direction;
+  void main() {
+    gl_FragColor = vec4(textureCube(sky, direction).rgb, 1.0);
+  }
+`;
+
+/**
+ * Paint the sky.
+ *
+ * @param renderer - to paint with.
+ * @param towardsSun - unit vector.
+ * @param linear - whether light is wanted, as of what is reflected, not colours as seen.
+ */
+export function paintSky(
+  renderer: WebGLRenderer,
+  towardsSun: Vector3,
+  linear: boolean,
+): WebGLCubeRenderTarget {
+  const target = new WebGLCubeRenderTarget(linear ? REFLECTED_PIXELS : PIXELS, {
+    type: linear ? HalfFloatType : UnsignedByteType,
   });
   const material = new ShaderMaterial({
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
     side: BackSide,
-    uniforms: { towardsSun: { value: towardsSun } },
+    uniforms: { towardsSun: { value: towardsSun }, linear: { value: linear } },
   });
-  const geometry = new SphereGeometry(10, 32, 16);
+  const geometry = new BoxGeometry(10, 10, 10);
   const scene = new Scene();
   scene.add(new Mesh(geometry, material));
   new CubeCamera(0.1, 20, target).update(renderer, scene);
   geometry.dispose();
   material.dispose();
   return target;
+}
+
+/** Return what is seen behind everything. */
+export function skyMesh(sky: WebGLCubeRenderTarget): Mesh {
+  const material = new ShaderMaterial({
+    vertexShader: SEEN_VERTEX,
+    fragmentShader: SEEN_FRAGMENT,
+    side: BackSide,
+    depthWrite: false,
+    uniforms: { sky: { value: sky.texture } },
+  });
+  const mesh = new Mesh(new BoxGeometry(2, 2, 2), material);
+  mesh.frustumCulled = false;
+  mesh.renderOrder = 1;
+  return mesh;
 }
