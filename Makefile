@@ -41,7 +41,7 @@ $(READY): pyproject.toml constraints.txt
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
 		--constraint constraints.txt hatchling editables
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
-		--constraint constraints.txt --no-build-isolation --editable '.[train,lab,play,sound,video,demos,docs,dev]'
+		--constraint constraints.txt --no-build-isolation --editable '.[train,lab,play,video,demos,docs,dev]'
 	@$(BIN)/python -m roller_env
 	@touch $(READY)
 	@echo "$(VENV) is ready."
