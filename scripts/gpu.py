@@ -85,7 +85,7 @@ def main(arguments: Arguments) -> None:
 
 def _compile(config: EnvConfig) -> None:
     """Say how large the kernels are."""
-    from roller_env.lab.cuda.compiler import as_written, assembled, ptx_of
+    from roller_env.lab.cuda.compiler import assembled, ptx_of
     from roller_env.lab.cuda.games import Player
 
     player = Player(config)
@@ -95,8 +95,7 @@ def _compile(config: EnvConfig) -> None:
     arguments = {"step": (games, force_n, out), "draw": (games.random, choices, force_n)}
     for name, given in arguments.items():
         begun = time.perf_counter()
-        with as_written():
-            ptx = ptx_of(player.kernels[name], given)
+        ptx = ptx_of(player.kernels[name], given)
         compiled = time.perf_counter()
         machine = assembled(ptx)
         _say(

@@ -22,10 +22,8 @@ HOPPER: Final = (9, 0)
 
 
 @cache
-def know_device_functions() -> None:
+def _know_device_functions() -> None:
     """Have Numba for CUDA compile a `DeviceFunction` as it does what Numba itself decorates."""
-    if numba.config.ENABLE_CUDASIM:
-        return
     typing: Any = import_module("numba.cuda.descriptor").cuda_target.typing_context
 
     def type_of(function: DeviceFunction[..., Any], context: Any) -> Any:
@@ -35,14 +33,11 @@ def know_device_functions() -> None:
 
 
 @contextmanager
-def as_written() -> Iterator[None]:
+def _as_written() -> Iterator[None]:
     """Compile IEEE arithmetic in the order written, as the CPU's: no product is fused with a sum.
 
     Numba has no option for that switch of NVIDIA's compiler.
     """
-    if numba.config.ENABLE_CUDASIM:
-        yield
-        return
     nvvm: Any = import_module("numba.cuda.cudadrv.nvvm")
     original = nvvm.compile_ir
 
@@ -54,6 +49,22 @@ def as_written() -> Iterator[None]:
         yield
     finally:
         nvvm.compile_ir = original
+
+
+def compiled_for_card(kernel: Any, arguments: tuple[Any, ...], registers: int | None) -> Any:
+    """Return a kernel compiled for the card and for arguments of these types.
+
+    Args:
+        kernel: Python function.
+        arguments: that it may be called with.
+        registers: of a thread, at most; None: as many as the compiler likes.
+    """
+    if numba.config.ENABLE_CUDASIM:
+        return cuda.jit(kernel)
+    _know_device_functions()
+    with _as_written():
+        # Optimised when linked it would be fused there.
+        return cuda.jit(kernel, lto=False, max_registers=registers).specialize(*arguments)
 
 
 @contextmanager
@@ -75,9 +86,9 @@ def ptx_of(kernel: Any, arguments: tuple[Any, ...]) -> str:
         kernel: Python function.
         arguments: that it would be called with; arrays may be NumPy's.
     """
-    know_device_functions()
+    _know_device_functions()
     types = [numba.typeof(each) for each in arguments]
-    with _card(HOPPER):
+    with _as_written(), _card(HOPPER):
         ptx, _ = cuda.compile(
             kernel, numba.void(*types), cc=HOPPER, device=False, abi="numba", output="ptx"
         )

@@ -13,7 +13,7 @@ from roller_env.arrays import Float32, Float64
 from roller_env.compile.rigid import CAP_S
 from roller_env.config import EnvConfig
 from roller_env.game.actions import DIRECTIONS, forces
-from roller_env.lab.cuda.compiler import as_written, cuda, know_device_functions
+from roller_env.lab.cuda.compiler import compiled_for_card, cuda
 from roller_env.lab.cuda.kernels import Games, Rows, draw, step_of
 from roller_env.simulation import Simulation
 
@@ -47,8 +47,7 @@ class Player:
             raise ValueError(
                 f"physics: found {config.preset.name!r}; on a card there are 'rigid' and 'relaxed'"
             )
-        know_device_functions()
-        self._limits = {} if registers is None else {"max_registers": registers}
+        self._registers = registers
         self._compiled: dict[str, Any] = {}
         self.simulation = Simulation(config, 1)
         self.simulation.state.truncated[:] = False  # As at the beginning of an episode.
@@ -90,9 +89,7 @@ class Player:
     def compiled(self, name: str, *arguments: Any) -> Any:
         """Return a kernel for arguments like these; all envs of one level have the same types."""
         if name not in self._compiled:
-            with as_written():
-                kernel = cuda.jit(self.kernels[name], **self._limits)
-                self._compiled[name] = kernel.specialize(*arguments)
+            self._compiled[name] = compiled_for_card(self.kernels[name], arguments, self._registers)
         return self._compiled[name]
 
     def games(
