@@ -133,13 +133,13 @@ def _play(config: EnvConfig, arguments: Arguments) -> None:
     with arguments.out.open("w", encoding="utf-8", newline="") as file:
         table = csv.DictWriter(file, names, lineterminator="\n")
         table.writeheader()
-        for row in _cpu_rows(beside, names):
-            table.writerow(row)
         for speed in card_speeds(player, arguments.sizes, arguments.seconds):
             row = {name: _number(value) for name, value in asdict(speed).items()}
             _say(_line(row))
             table.writerow(row)
             file.flush()
+        for row in _cpu_rows(beside, names):
+            table.writerow(row)
     _say(f"{arguments.out} is written")
 
 

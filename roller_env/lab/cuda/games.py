@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from numba.cuda.random import create_xoroshiro128p_states
+from numba.cuda.random import create_xoroshiro128p_states, xoroshiro128p_dtype
 
 from roller_env.arrays import Float32, Float64
 from roller_env.compile.rigid import CAP_S
@@ -142,7 +142,7 @@ class Player:
     def host_games(self, count: int) -> Games:
         """Return the same in NumPy's arrays: what there is to compile without a card."""
         rows = Rows(*(np.zeros((count, each.shape[1]), each.dtype, "F") for each in self.fresh))
-        random = np.zeros(count, [("s0", np.uint64), ("s1", np.uint64)])
+        random = np.zeros(count, xoroshiro128p_dtype)
         return self.games(rows, self.fresh, random, lambda array: array)
 
     def named(self, rows: Rows) -> Mapping[str, Array]:

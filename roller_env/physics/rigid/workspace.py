@@ -71,6 +71,7 @@ SLAB: Final = np.dtype(
 
 _SIZE: Final = 3 * MOST_CONTACTS
 
+
 def work_record(most_near: int = MOST_NEAR) -> np.dtype[np.void]:
     """Return what one thread needs for one ball at a time, near ``most_near`` solids."""
     return np.dtype(
@@ -94,6 +95,7 @@ def work_record(most_near: int = MOST_NEAR) -> np.dtype[np.void]:
 
 
 WORK: Final = work_record()
+"""Enough for any scenes: Numba compiles anew for a record of another size."""
 
 
 class Workspace(NamedTuple):
