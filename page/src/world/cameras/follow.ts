@@ -31,6 +31,8 @@ const MOST_TURN_RAD_S = rad(170);
 /** Where the ball will be so soon is kept in the picture. */
 const AHEAD_S = 0.22;
 const MOST_AHEAD_M = 1.5;
+/** Thrown up or falling, the ball stays nearer the middle: the picture is wider than high. */
+const AHEAD_UPWARDS = 0.4;
 const AHEAD_EASE_S = 0.25;
 
 /** Rolling towards the camera, one sees more of the way from higher up. */
@@ -92,6 +94,7 @@ export class FollowCamera {
   private lookAhead(frame: Frame, elapsedS: number): void {
     this.way.set(...frame.velocity).multiplyScalar(AHEAD_S);
     this.way.clampLength(0, MOST_AHEAD_M);
+    this.way.z *= AHEAD_UPWARDS;
     this.ahead.lerp(this.way, easing(elapsedS, AHEAD_EASE_S));
   }
 
