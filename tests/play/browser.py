@@ -16,6 +16,7 @@ from typing import Any, Final
 from tests.patience import STALLED_S
 
 PHASES: Final = ("start", "intro", "playing", "paused", "ended")
+_SETTINGS: Final = json.dumps({"keys": "world", "camera": "game", "quality": "low"})
 SIZE: Final = {"width": 640, "height": 400}
 
 
@@ -39,6 +40,8 @@ class Person:
         self.page.on("pageerror", lambda error: self.faults.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.on("websocket", self._on_socket)
+        # The keys of the agents: W is +x, however the camera turns.
+        self.page.add_init_script(f"localStorage.setItem('roller settings', '{_SETTINGS}')")
         self.page.goto(url)
 
     def close(self) -> None:

@@ -91,8 +91,10 @@ def test_the_finish_shows_medal_and_time_and_goes_on(person: Person) -> None:
     again(person)
     person.hold_until("w", "the finish", lambda: person.phase == "ended")
     dialog = person.page.get_by_role("dialog").filter(visible=True)
-    dialog.get_by_text("gold", exact=False).first.wait_for()
-    dialog.get_by_role("button", name="Again").click()
+    dialog.get_by_text("Finish!").wait_for()
+    dialog.get_by_text("1 of 1").wait_for()
+    dialog.get_by_role("button", name="Next: Open floor").wait_for()
+    dialog.get_by_role("button", name="Play again").click()
     person.wait_for_phase("playing")
     assert person.x < 1.0
 
@@ -100,10 +102,12 @@ def test_the_finish_shows_medal_and_time_and_goes_on(person: Person) -> None:
 def test_the_ghost_of_the_best_run_rolls_beside(person: Person) -> None:
     again(person)
     person.hold_until("w", "the finish", lambda: person.phase == "ended")
-    person.page.get_by_role("button", name="Levels").filter(visible=True).first.click()
-    person.wait_for_phase("start")
+    person.page.get_by_role("button", name="Play again").click()
+    person.wait_for_phase("playing")
+    person.press("p")
+    person.wait_for_phase("paused")
     person.page.get_by_label("Race against").filter(visible=True).select_option("best")
-    person.start()
+    person.page.get_by_role("button", name="Go on", exact=True).click()
     person.wait("a ghost", lambda: person.ghost)
 
 
@@ -114,7 +118,7 @@ def test_a_page_that_loses_the_focus_pauses_and_lets_go(person: Person) -> None:
     person.page.evaluate("window.dispatchEvent(new Event('blur'))")
     person.wait_for_phase("paused")
     person.page.keyboard.up("w")
-    person.page.get_by_role("button", name="Go on").click()
+    person.page.get_by_role("button", name="Go on", exact=True).click()
     person.wait_for_phase("playing")
     person.wait("no key pushes", lambda: person.keys == 0)
 
@@ -125,7 +129,7 @@ def test_a_game_goes_on_where_it_was_after_a_reload(person: Person) -> None:
     person.page.reload()
     person.wait_for_phase("paused")
     assert person.x > 0.4
-    person.page.get_by_role("button", name="Go on").click()
+    person.page.get_by_role("button", name="Go on", exact=True).click()
     person.wait_for_phase("playing")
 
 
