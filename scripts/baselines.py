@@ -28,6 +28,7 @@ from tqdm import tqdm
 from roller_env.lab import baselines, trainings
 
 NAME = "baselines"
+RESULTS = Path("docs/results")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +50,7 @@ class Run:
     recipe: Path = Path("configs/ppo.yaml")
     """Configuration."""
 
-    out: Path = Path("docs/results")
+    out: Path = RESULTS
     """Directory of baselines.csv and baselines_curves.csv."""
 
     policies: Path | None = None
@@ -70,7 +71,7 @@ def run(arguments: Run) -> None:
     if arguments.quick:
         experiment = replace(experiment, changes=(*experiment.changes, *trainings.QUICK.changes))
     out = arguments.out
-    beside = Path("runs") if out == Run.out else out
+    beside = Path("runs") if out == RESULTS else out
     with TemporaryDirectory() as directory:
         baselines.compile_once(arguments.recipe, Path(directory) / NAME)
     print(f"compiled after {time.time() - started_s:.0f} s", flush=True)

@@ -43,5 +43,7 @@ def compile_once(recipe: Path, stem: Path) -> None:
         recipe: configuration of what follows.
         stem: of files that are made and not kept.
     """
-    first = Experiment(trainings.QUICK.trials[:1], (*trainings.QUICK.changes, *EXPERIMENT.changes[1:]))
+    first = Experiment(
+        trainings.QUICK.trials[:1], (*trainings.QUICK.changes, *EXPERIMENT.changes[1:])
+    )
     trainings.run(first, recipe, stem, jobs=1)

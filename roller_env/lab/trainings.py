@@ -288,9 +288,7 @@ def _append(file: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         writer.writerows(rows)
 
 
-def _tried(
-    trial: Trial, experiment: Experiment, recipe: Path, deadline_s: float | None
-) -> Tried:
+def _tried(trial: Trial, experiment: Experiment, recipe: Path, deadline_s: float | None) -> Tried:
     own = (f"level={trial.level}", f"seed={trial.seed}", "checkpoint_interval_s=1e9")
     config = load_config(recipe, (*own, *experiment.changes, *VARIANTS[trial.variant]))
     if deadline_s is not None:
