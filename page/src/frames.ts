@@ -12,7 +12,7 @@ const KEPT = 4;
 /** Time in which the playhead makes up for what it is ahead or behind. */
 const CATCH_UP_S = 0.25;
 
-/** Further off than this it jumps instead. */
+/** Further behind than this it jumps instead. */
 const MAX_ERROR_S = 0.25;
 
 /** A step further than this is a seek. */
@@ -97,10 +97,11 @@ export class FrameBuffer {
     const oldest = this.frames[0] ?? newest;
     const interval = (newest.clockS - oldest.clockS) / Math.max(this.frames.length - 1, 1);
     const target = newest.clockS - Math.min(DELAY_FRAMES * interval, MAX_DELAY_S);
-    this.playhead += elapsedS * newest.speed;
-    const error = target - this.playhead;
-    const far = Math.abs(error) > MAX_ERROR_S;
-    this.playhead += far ? error : error * Math.min(elapsedS / CATCH_UP_S, 1);
+    const ahead = this.playhead + elapsedS * newest.speed;
+    const error = target - ahead;
+    const share = error > MAX_ERROR_S ? 1 : Math.min(elapsedS / CATCH_UP_S, 1);
+    // Waiting for a frame that is late, time may stand still, but never runs back.
+    this.playhead = Math.max(this.playhead, ahead + share * error);
     this.playhead = Math.min(this.playhead, newest.clockS);
   }
 }

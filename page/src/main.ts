@@ -2,7 +2,7 @@
 
 import { Connection, type Listener, socketAddress } from "./connection";
 import { FrameBuffer } from "./frames";
-import { Page, rootElement } from "./page";
+import { begin, Page } from "./page";
 import { Sound } from "./sound";
 import type { Frame, FromServer, LevelMessage, Scene } from "./types";
 import { decodeFrame } from "./wire";
@@ -12,14 +12,19 @@ const NOTICE_MS = 6000;
 class Live implements Listener {
   private readonly frames = new FrameBuffer();
   private readonly sound = new Sound();
-  private readonly connection = new Connection(socketAddress(location.href), this);
-  private readonly page = new Page(
-    rootElement(),
-    (message) => this.connection.send(message),
-    (nowS) => this.frames.sample(nowS),
-  );
+  private readonly page: Page;
+  private readonly connection: Connection;
   private resultOfEpisode = 0;
   private noticeTimer = 0;
+
+  constructor(root: HTMLElement) {
+    this.page = new Page(
+      root,
+      (message) => this.connection.send(message),
+      (nowS) => this.frames.sample(nowS),
+    );
+    this.connection = new Connection(socketAddress(location.href), this);
+  }
 
   opened(): void {
     this.page.view.connection = "open";
@@ -50,7 +55,7 @@ class Live implements Listener {
         document.title = message.title;
         break;
       case "level":
-        void this.load(message);
+        this.load(message).catch((error: Error) => this.notice(`No level: ${error.message}`));
         break;
       case "seat":
         view.seat = message.seat;
@@ -72,12 +77,17 @@ class Live implements Listener {
         view.problems = message;
         break;
       case "notice":
-        view.notice = message.text;
-        clearTimeout(this.noticeTimer);
-        this.noticeTimer = window.setTimeout(() => {
-          view.notice = null;
-        }, NOTICE_MS);
+        this.notice(message.text);
     }
+  }
+
+  private notice(text: string): void {
+    const { view } = this.page;
+    view.notice = text;
+    clearTimeout(this.noticeTimer);
+    this.noticeTimer = window.setTimeout(() => {
+      view.notice = null;
+    }, NOTICE_MS);
   }
 
   private async load(level: LevelMessage): Promise<void> {
@@ -106,4 +116,4 @@ async function fetchScene(address: string): Promise<Scene> {
   return (await response.json()) as Scene;
 }
 
-new Live();
+void begin((root) => new Live(root));

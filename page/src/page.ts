@@ -31,6 +31,7 @@ export class Page {
   private readonly world: World;
   private readonly ui: Ui;
   private readonly input: Input;
+  private lowered: { of: Settings; low: Settings } | null = null;
   private readonly pictures = { count: 0, sinceS: 0 };
 
   /**
@@ -67,12 +68,22 @@ export class Page {
     requestAnimationFrame((ms) => this.tick(ms / 1000));
     const frame = this.frameAt(nowS);
     if (frame && this.view.scene) {
-      const camera = this.world.draw(frame, this.view.settings, nowS);
+      const camera = this.world.draw(frame, this.drawn(), nowS);
       if (camera !== this.view.settings.camera) this.setSettings({ camera });
     }
     this.countPicture(nowS);
     this.input.update(this.view);
     this.ui.update(this.view);
+  }
+
+  /** Return the settings to draw with: the server may know that its players' machines are slow. */
+  private drawn(): Settings {
+    const { settings, hello } = this.view;
+    if (settings.quality !== "auto" || hello?.quality !== "low") return settings;
+    if (this.lowered?.of !== settings) {
+      this.lowered = { of: settings, low: { ...settings, quality: "low" } };
+    }
+    return this.lowered.low;
   }
 
   private setSettings(change: Partial<Settings>): void {
@@ -99,9 +110,14 @@ export class Page {
   }
 }
 
-/** Return the element that the page goes into. */
-export function rootElement(): HTMLElement {
+/** Begin in the element that the page goes into, or say there why that cannot be. */
+export async function begin(page: (root: HTMLElement) => unknown): Promise<void> {
   const root = document.getElementById("app");
   if (root === null) throw new Error('the page has no element "app"');
-  return root;
+  try {
+    await page(root);
+  } catch (error) {
+    root.textContent = `Roller cannot be shown here: ${error instanceof Error ? error.message : error}`;
+    throw error;
+  }
 }

@@ -1,7 +1,7 @@
 /** A replay in a file of its own: states that were recorded, played without a server. */
 
 import { between } from "./frames";
-import { Page, rootElement } from "./page";
+import { begin, Page } from "./page";
 import type { Frame, Phase, ResultMessage, Scene, ToServer } from "./types";
 import { decodeFrame } from "./wire";
 
@@ -35,13 +35,14 @@ class Replay {
   private shownAtS: number | null = null;
 
   constructor(
+    root: HTMLElement,
     private readonly recorded: Recorded,
     scene: Scene,
     private readonly frames: readonly Frame[],
   ) {
     this.lastS = (frames.length - 1) / recorded.rate_hz;
     this.page = new Page(
-      rootElement(),
+      root,
       (message) => this.take(message),
       (nowS) => this.frameAt(nowS),
     );
@@ -149,7 +150,7 @@ async function unpack(base64: string): Promise<ArrayBuffer> {
   return new Response(unpacked).arrayBuffer();
 }
 
-async function start(): Promise<void> {
+async function start(root: HTMLElement): Promise<void> {
   const recorded = window.ROLLER;
   if (recorded === undefined) throw new Error("there is no replay in this file");
   const scene = JSON.parse(new TextDecoder().decode(await unpack(recorded.scene))) as Scene;
@@ -159,7 +160,7 @@ async function start(): Promise<void> {
   const frames = Array.from({ length: count }, (_, i) =>
     decodeFrame(new DataView(data, i * recorded.frame_bytes, recorded.frame_bytes), scene.coins),
   );
-  new Replay(recorded, scene, frames);
+  new Replay(root, recorded, scene, frames);
 }
 
-void start();
+void begin(start);

@@ -190,6 +190,8 @@ def test_a_finish_is_a_record_and_with_every_coin_leads_to_the_next_level() -> N
         row = player.last("levels")["levels"][0]
         assert (row["medal"], row["attempts"], row["best_coins"]) == ("gold", 1, 1)
         assert row["best_time_s"] == result["time_s"]
+        # Who reloads the page is told once more how it ended.
+        assert Somebody(room).last("result") == result
         player.say('{"type":"ghost","kind":"best"}')
         player.say('{"type":"next"}')
         await until(lambda: player.last("level")["name"] == "second" and player.phase == PLAYING)

@@ -24,61 +24,29 @@ from websockets.typing import Origin
 
 from roller_env.play.server import LOOPBACK, MAX_GUESTS, PlayError, listen, warning_of
 from tests.patience import STALLED_S
+from tests.play.served import ROOT, Served
 
 pytestmark = pytest.mark.xdist_group("page")
 
-ROOT = Path(__file__).parents[2]
-ADDRESS = "The game is at http://localhost:"
+
+def play(records: Path, *arguments: str) -> Served:
+    """Start a game."""
+    return Served("play", "flat", "--physics=rigid", f"--records={records}", *arguments)
 
 
-class Served:
-    """`roller play` as a person starts it."""
-
-    def __init__(self, records: Path, *arguments: str) -> None:
-        self.process = subprocess.Popen(
-            [
-                sys.executable,
-                str(ROOT / "scripts" / "play.py"),
-                "flat",
-                "--port=0",
-                "--physics=rigid",
-                f"--records={records}",
-                *arguments,
-            ],
-            env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"},
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        assert self.process.stdout is not None
-        for line in self.process.stdout:
-            if line.startswith(ADDRESS):
-                self.port = int(line.removeprefix(ADDRESS).partition("/")[0])
-                break
-        else:
-            raise AssertionError("it ended before it served anything")
-
-    def url(self, path: str = "/") -> str:
-        return f"http://localhost:{self.port}{path}"
-
-    def connect(self, **options: Any) -> ClientConnection:
-        # A connection that nobody reads takes its time to say good bye.
-        options = {"close_timeout": 0.1, **options}
-        connection: ClientConnection = connect(f"ws://localhost:{self.port}/ws", **options)
-        return connection
-
-    def end(self, number: int = signal.SIGINT) -> int:
-        self.process.send_signal(number)
-        self.process.communicate(timeout=STALLED_S)
-        return self.process.returncode
+def connected(game: Served, **options: Any) -> ClientConnection:
+    """Connect as a browser does."""
+    # A connection that nobody reads takes its time to say good bye.
+    options = {"close_timeout": 0.1, **options}
+    connection: ClientConnection = connect(f"ws://localhost:{game.port}/ws", **options)
+    return connection
 
 
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    game = Served(tmp_path_factory.mktemp("records") / "records.sqlite3")
+    game = play(tmp_path_factory.mktemp("records") / "records.sqlite3")
     yield game
-    assert game.end() == 0
+    assert game.end()[0] == 0
 
 
 def messages(connection: ClientConnection, kind: str) -> Any:
@@ -115,7 +83,7 @@ def get(url: str, **headers: str) -> tuple[int, bytes, Any]:
 
 
 def test_a_page_gets_its_level_and_frames(served: Served) -> None:
-    with served.connect() as connection:
+    with connected(served) as connection:
         hello = messages(connection, "hello")
         assert (hello["seat"], hello["mode"]) == ("player", "play")
         assert [row["number"] for row in hello["levels"]] == list(range(1, 21))
@@ -155,11 +123,11 @@ def test_the_page_is_reached_by_no_other_name(served: Served) -> None:
 )
 def test_a_page_of_another_origin_is_not_let_in(served: Served, origin: str) -> None:
     with pytest.raises(InvalidStatus, match="403"):
-        served.connect(origin=Origin(origin))
+        connected(served, origin=Origin(origin))
 
 
 def test_a_page_of_a_tunnels_other_end_is_let_in(served: Served) -> None:
-    with served.connect(origin=Origin("http://localhost:9999")) as connection:
+    with connected(served, origin=Origin("http://localhost:9999")) as connection:
         assert messages(connection, "hello")["type"] == "hello"
 
 
@@ -167,16 +135,16 @@ def test_a_page_of_a_tunnels_other_end_is_let_in(served: Served) -> None:
 def test_who_sends_what_is_no_message_is_sent_away_and_the_game_goes_on(
     served: Served, text: str
 ) -> None:
-    with served.connect() as connection:
+    with connected(served) as connection:
         messages(connection, "hello")
         connection.send(text)
         assert code_of_end(connection) == 1008
-    with served.connect() as connection:
+    with connected(served) as connection:
         assert frame(connection)
 
 
 def test_a_message_without_end_is_not_read(served: Served) -> None:
-    with served.connect() as connection:
+    with connected(served) as connection:
         connection.send("x" * 100_000)
         assert code_of_end(connection) == 1009
 
@@ -184,13 +152,13 @@ def test_a_message_without_end_is_not_read(served: Served) -> None:
 def test_no_more_browsers_than_there_is_room_for(served: Served) -> None:
     with contextlib.ExitStack() as there:
         for _ in range(MAX_GUESTS):
-            messages(there.enter_context(served.connect()), "hello")
-        with served.connect() as connection:
+            messages(there.enter_context(connected(served)), "hello")
+        with connected(served) as connection:
             assert code_of_end(connection) == 1013
 
 
 def test_a_browser_that_takes_nothing_holds_up_nobody(served: Served) -> None:
-    with served.connect() as player, served.connect(max_queue=1) as slow:
+    with connected(served) as player, connected(served, max_queue=1) as slow:
         messages(player, "hello")
         player.send('{"type":"start"}')
         player.send('{"type":"skip"}')
@@ -206,7 +174,7 @@ def test_a_browser_that_takes_nothing_holds_up_nobody(served: Served) -> None:
 def test_an_idle_page_costs_next_to_nothing(served: Served) -> None:
     psutil = pytest.importorskip("psutil")
     process = psutil.Process(served.process.pid)
-    with served.connect() as connection:
+    with connected(served) as connection:
         for _ in range(5):
             frame(connection)
         before, begin = sum(process.cpu_times()[:2]), time.monotonic()
@@ -218,8 +186,8 @@ def test_an_idle_page_costs_next_to_nothing(served: Served) -> None:
 
 def test_records_outlive_the_program_even_a_killed_one(tmp_path: Path) -> None:
     records = tmp_path / "records.sqlite3"
-    game = Served(records, "--skip-intro")
-    with game.connect() as connection:
+    game = play(records, "--skip-intro")
+    with connected(game) as connection:
         messages(connection, "level")
         connection.send('{"type":"start"}')
         told: dict[str, Any] = {}
@@ -229,12 +197,12 @@ def test_records_outlive_the_program_even_a_killed_one(tmp_path: Path) -> None:
             told = json.loads(found) if isinstance(found, str) else {}
         assert told["best_time"]
     game.end(signal.SIGKILL)
-    game = Served(records)
-    with game.connect() as connection:
+    game = play(records)
+    with connected(game) as connection:
         row = messages(connection, "levels")["levels"][0]
         assert row["name"] == "flat"
         assert row["best_time_s"] > 1.0
-    assert game.end(signal.SIGTERM) == 0
+    assert game.end(signal.SIGTERM)[0] == 0
 
 
 @pytest.fixture

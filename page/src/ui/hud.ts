@@ -36,11 +36,9 @@ export class Hud {
     this.reach.append(this.reachText);
     const tools = make("nav", { class: "hud-tools", "aria-label": "Game" });
     const tool = (icon: IconName, label: string, command: Command): void => {
-      const one = button(drawIcon(icon), "tool", () => giveCommand(command));
-      one.setAttribute("aria-label", label);
-      one.title = label;
-      this.buttons[command] = one;
-      tools.append(one);
+      this.buttons[command] = button("", "tool", () => giveCommand(command));
+      this.label(command, icon, label);
+      tools.append(this.buttons[command]);
     };
     tool("pause", "Pause (P)", "pause");
     tool("restart", "Restart (R)", "restart");
@@ -75,13 +73,18 @@ export class Hud {
     this.show("restart", steers);
     this.show("pause", seat === "player");
     this.show("research", hello !== null && (hello.mode !== "watch" || frame.hasAgent));
-    const { mute } = this.buttons;
-    if (mute && mute.dataset.muted !== String(settings.muted)) {
-      mute.dataset.muted = String(settings.muted);
-      mute.replaceChildren(drawIcon(settings.muted ? "mute" : "sound"));
-      mute.title = settings.muted ? "Sound on (M)" : "Sound off (M)";
-      setAttribute(mute, "aria-label", mute.title);
-    }
+    if (settings.muted) this.label("mute", "mute", "Sound on (M)");
+    else this.label("mute", "sound", "Sound off (M)");
+    if (frame.phase === "paused") this.label("pause", "play", "Go on (P)");
+    else this.label("pause", "pause", "Pause (P)");
+  }
+
+  private label(command: Command, icon: IconName, label: string): void {
+    const one = this.buttons[command];
+    if (one === undefined || one.title === label) return;
+    one.replaceChildren(drawIcon(icon));
+    one.title = label;
+    setAttribute(one, "aria-label", label);
   }
 
   private show(command: Command, shown: boolean): void {

@@ -174,7 +174,7 @@ export class Ui {
       mute: () => this.actions.setSettings({ muted: !view.settings.muted }),
       research: () => this.toggleResearch(view),
       push: () => this.skipIntro(view),
-      step: () => view.frame?.phase === "paused" && this.ask(view, "step"),
+      step: () => view.seat === "player" && this.timeline.stepOn(view),
       slower: () => view.seat === "player" && this.timeline.changeSpeed(view, false),
       faster: () => view.seat === "player" && this.timeline.changeSpeed(view, true),
       back: () => this.go(view, -1, 0),
@@ -206,8 +206,9 @@ export class Ui {
   }
 
   private toggleResearch(view: View): void {
-    if (view.frame === null || view.frame.phase === "start") return;
-    this.research = !this.research;
+    if (view.frame !== null && this.base !== "start" && this.base !== "end") {
+      this.research = !this.research;
+    }
   }
 
   private skipIntro(view: View): void {
@@ -221,10 +222,7 @@ export class Ui {
     else if (this.start.isShown) this.start.move(columns, rows);
   }
 
-  private ask(
-    view: View,
-    type: "restart" | "pause" | "resume" | "hand_back" | "step" | "skip",
-  ): void {
+  private ask(view: View, type: "restart" | "pause" | "resume" | "hand_back" | "skip"): void {
     if (view.seat === "player" && view.frame?.phase !== "start") this.actions.send({ type });
   }
 }

@@ -2,7 +2,7 @@
 
 import { make } from "./dom";
 
-const WIDTH = 132;
+const WIDTH = 100;
 const HEIGHT = 26;
 /** Values kept of each number: about nine seconds at ten a second. */
 const KEPT = 90;

@@ -8,8 +8,8 @@ import { drawIcon } from "./icon";
 
 export const SPEEDS: readonly number[] = [0.1, 0.25, 0.5, 1, 2];
 
-/** A moment so near to the last one is the last one; seconds. */
-const AT_END_S = 0.02;
+/** A moment so near to the last one is the last one; seconds, less than any control step. */
+const AT_END_S = 5e-4;
 /** While the bar is drawn along, the server is asked at most this often; milliseconds. */
 const SEEK_EVERY_MS = 50;
 
@@ -90,6 +90,15 @@ export class Timeline {
     }
     const back = seekable && frame.timeS < timeline.last_s - AT_END_S;
     setShown(this.branch, paused && back && timeline.can_branch);
+  }
+
+  /** Go on by a control step: one that was made, or after the last one a new one. */
+  stepOn({ frame, level, timeline }: View): void {
+    if (frame?.phase !== "paused") return;
+    const step = level?.control_dt_s ?? 0;
+    // Frames tell their time in 32 bits, so half a step is the surest bound.
+    const made = timeline !== null && frame.timeS + step / 2 < timeline.last_s;
+    this.actions.send(made ? { type: "seek", time_s: frame.timeS + step } : { type: "step" });
   }
 
   /** Go some seconds on, or back. */

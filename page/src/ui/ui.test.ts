@@ -151,6 +151,7 @@ it("scrubs a pause with the time line in the place of its panel, and branches", 
   show({ frame: fakeFrame({ phase: "paused", timeS: 20 }), timeline });
   expect(shown(".pause")).toBe(false);
   expect(shown(".timeline .main")).toBe(false);
+  expect(asked("step")).toEqual(["step"]);
   const bar = document.querySelector<HTMLInputElement>(".scrub");
   if (bar === null) throw new Error("there is no bar");
   bar.value = "12.5";
@@ -158,7 +159,8 @@ it("scrubs a pause with the time line in the place of its panel, and branches", 
   expect(sent.at(-1)).toEqual({ type: "seek", time_s: 12.5 });
   show({ frame: fakeFrame({ phase: "paused", timeS: 12.5 }), timeline });
   expect(text(".timeline .main")).toBe("Go on from here");
-  expect(asked("step")).toEqual(["step"]);
+  expect(asked("step")).toEqual(["seek"]);
+  expect(sent.at(-1)).toEqual({ type: "seek", time_s: 12.5 + 1 / 240 });
   expect(asked("slower")).toEqual(["speed"]);
   expect(sent.at(-1)).toEqual({ type: "speed", factor: 0.5 });
 });

@@ -12,6 +12,7 @@ import {
   type WebGLRenderTarget,
   Scene as World3,
 } from "three";
+import { goesOn } from "../frames";
 import type { Frame, Scene, Settings } from "../types";
 import { Balls } from "./balls";
 import { type Eye, newEye, yawOf } from "./cameras/eye";
@@ -41,6 +42,13 @@ const SHADOW_PIXELS = 2048;
 /** With no graphics card more pictures a second would take the game its processor. */
 const SOFTWARE_FRAME_S = 1 / 31;
 
+/** The last picture. */
+interface Drawn {
+  frame: Frame;
+  settings: Settings;
+  atS: number;
+}
+
 export class World {
   private readonly renderer: WebGLRenderer;
   private readonly world = new World3();
@@ -55,9 +63,10 @@ export class World {
   private readonly eye: Eye = newEye();
   private choice: CameraChoice = "follow";
   private dragged = false;
+  private cutNext = true;
   private scene: Scene | null = null;
   private parts: Parts | null = null;
-  private drawn: { frame: Frame; atS: number } | null = null;
+  private drawn: Drawn | null = null;
 
   /** @throws Error if the browser has no WebGL 2. */
   constructor(private readonly canvas: HTMLCanvasElement) {
@@ -82,6 +91,8 @@ export class World {
       },
       () => this.choice === "orbit",
     );
+    // What the graphics card has forgotten, a new page paints again.
+    canvas.addEventListener("webglcontextrestored", () => location.reload());
     this.resize();
   }
 
@@ -95,7 +106,7 @@ export class World {
     this.scene = scene;
     this.build(scene);
     this.game.reset();
-    this.follow.reset();
+    this.cutNext = true;
     this.drawn = null;
   }
 
@@ -124,12 +135,16 @@ export class World {
    */
   draw(frame: Frame, settings: Settings, nowS: number): CameraChoice {
     if (this.parts === null) return settings.camera;
-    const elapsedS = this.drawn ? Math.max(nowS - this.drawn.atS, 0) : 0;
-    if (this.software && this.drawn && elapsedS < SOFTWARE_FRAME_S) return settings.camera;
+    const { drawn } = this;
+    const elapsedS = drawn ? Math.max(nowS - drawn.atS, 0) : 0;
+    if (this.software && drawn && this.canWait(drawn, frame, settings, elapsedS)) {
+      return settings.camera;
+    }
     this.adapt(settings, elapsedS);
-    if (this.drawn && this.drawn.frame.episode !== frame.episode) this.follow.reset();
+    if (this.cutNext || (drawn && !goesOn(drawn.frame, frame))) this.follow.cut(frame);
+    this.cutNext = false;
     const choice = this.look(frame, settings.camera, elapsedS);
-    this.drawn = { frame, atS: nowS };
+    this.drawn = { frame, settings, atS: nowS };
     const { scenery, balls, labels, solids } = this.parts;
     const mode = typeof choice === "number" || choice === "game" ? this.game.mode : -1;
     scenery.setSeenFromBelow(mode === BELOW);
@@ -139,6 +154,12 @@ export class World {
     this.light(frame);
     this.renderer.render(this.world, this.camera);
     return choice;
+  }
+
+  /** Return whether a picture may be left out: the processor that would draw it is the game's, too. */
+  private canWait(drawn: Drawn, frame: Frame, settings: Settings, elapsedS: number): boolean {
+    if (elapsedS < SOFTWARE_FRAME_S) return true;
+    return frame === drawn.frame && settings === drawn.settings && settings.camera !== "orbit";
   }
 
   private look(frame: Frame, wanted: CameraChoice, elapsedS: number): CameraChoice {
@@ -151,10 +172,12 @@ export class World {
     this.choice = choice;
     const chosen = typeof choice === "number" ? choice : null;
     // It moves on, seen or not: its retreat is in time.
-    const holds = this.game.look(frame, chosen, elapsedS, eye);
-    if (choice === "follow") this.follow.look(frame, parts.solids, elapsedS, eye);
+    const gameS = frame.phase === "paused" ? 0 : elapsedS * frame.speed;
+    const holds = this.game.look(frame, chosen, gameS, eye);
+    if (choice === "follow") this.follow.look(frame, parts.solids, gameS, eye);
     if (choice === "orbit") this.orbit.look(frame, parts.solids, eye);
     if (!holds) this.choice = "game";
+    else if (chosen !== null) this.choice = this.game.mode;
     this.camera.position.copy(eye.position);
     this.camera.lookAt(eye.target);
     return this.choice;

@@ -38,7 +38,8 @@ const WHITE: Rgb = [1, 1, 1];
 /** How the sky is reflected, where it is reflected at all. */
 const FLOOR_ROUGHNESS = 0.55;
 const EDGE_ROUGHNESS = 0.7;
-const GLASS_ROUGHNESS = 0.08;
+/** Glass shines a little, or it would look like smoke. */
+const GLASS = { roughness: 0.08, emission: 0.2 };
 const ENVIRONMENT_SHARE = 0.35;
 
 interface Look {
@@ -104,7 +105,7 @@ export class Paints {
       colour: pattern === "plain" ? rgb : WHITE,
       alpha: faceAlpha(alpha),
       map: pattern === "plain" ? null : this.texture(TILE_PIXELS, tilePixels(rgb, pattern)),
-      roughness: alpha < 1 ? GLASS_ROUGHNESS : FLOOR_ROUGHNESS,
+      ...(alpha < 1 ? GLASS : { roughness: FLOOR_ROUGHNESS }),
     });
   }
 

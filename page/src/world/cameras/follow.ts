@@ -31,6 +31,8 @@ const MOST_TURN_RAD_S = rad(170);
 /** Where the ball will be so soon is kept in the picture. */
 const AHEAD_S = 0.22;
 const MOST_AHEAD_M = 1.5;
+/** Thrown up or falling, the ball stays nearer the middle: the picture is wider than high. */
+const AHEAD_UPWARDS = 0.4;
 const AHEAD_EASE_S = 0.25;
 
 /** Rolling towards the camera, one sees more of the way from higher up. */
@@ -49,22 +51,29 @@ export class FollowCamera {
   private readonly way = new Vector3();
   private readonly back = new Vector3();
 
-  /** Look along +x from behind, as at the start. */
-  reset(): void {
-    this.yaw = 0;
+  /** Begin anew, behind the ball: looking along +x, as at the start, or along the way it rolls. */
+  cut(frame: Frame): void {
+    const [vx, vy] = frame.velocity;
+    this.yaw = rolls(frame) ? Math.atan2(vy, vx) : 0;
     this.pitch = PITCH;
     this.distance = DISTANCE_M;
     this.restS = 0;
     this.ahead.set(0, 0, 0);
   }
 
-  /** Move on for a time. */
+  /**
+   * Move on for a time.
+   *
+   * @param frame - as drawn.
+   * @param solids - what may cover the ball.
+   * @param elapsedS - of the game's time: in slow motion the camera turns as slowly as the ball
+   *   rolls, and in a pause it stands.
+   * @param eye - is changed.
+   */
   look(frame: Frame, solids: Solids, elapsedS: number, eye: Eye): void {
     this.ball.set(...frame.ball);
-    // In slow motion the camera turns as slowly as the ball rolls.
-    const gameS = elapsedS * Math.min(frame.speed, 1);
-    this.turn(frame, gameS);
-    this.lookAhead(frame, gameS);
+    this.turn(frame, elapsedS);
+    this.lookAhead(frame, elapsedS);
     const wanted = this.clearPitch(frame, solids);
     this.pitch += (wanted - this.pitch) * easing(elapsedS, PITCH_EASE_S);
     const free = this.freeDistance(this.pitch, solids);
@@ -77,13 +86,12 @@ export class FollowCamera {
 
   private turn(frame: Frame, elapsedS: number): void {
     const [vx, vy] = frame.velocity;
-    const speed = Math.hypot(vx, vy);
-    const rolls = speed > REST_M_S && frame.phase !== "start";
-    this.restS = rolls ? 0 : this.restS + elapsedS;
-    if (!rolls && this.restS < REST_S) return;
-    const error = wrapped((rolls ? Math.atan2(vy, vx) : 0) - this.yaw);
-    const share = rolls
-      ? easing(elapsedS, TURN_S) * Math.min(speed / FULL_TURN_M_S, 1)
+    const rolling = rolls(frame);
+    this.restS = rolling ? 0 : this.restS + elapsedS;
+    if (this.restS > 0 && this.restS < REST_S) return;
+    const error = wrapped((rolling ? Math.atan2(vy, vx) : 0) - this.yaw);
+    const share = rolling
+      ? easing(elapsedS, TURN_S) * Math.min(Math.hypot(vx, vy) / FULL_TURN_M_S, 1)
       : easing(elapsedS, TURN_AT_REST_S);
     const most = MOST_TURN_RAD_S * elapsedS;
     this.yaw = wrapped(this.yaw + Math.min(Math.max(error * share, -most), most));
@@ -92,6 +100,7 @@ export class FollowCamera {
   private lookAhead(frame: Frame, elapsedS: number): void {
     this.way.set(...frame.velocity).multiplyScalar(AHEAD_S);
     this.way.clampLength(0, MOST_AHEAD_M);
+    this.way.z *= AHEAD_UPWARDS;
     this.ahead.lerp(this.way, easing(elapsedS, AHEAD_EASE_S));
   }
 
@@ -123,6 +132,11 @@ export class FollowCamera {
     const flat = Math.cos(pitch);
     return this.back.set(-flat * Math.cos(this.yaw), -flat * Math.sin(this.yaw), Math.sin(pitch));
   }
+}
+
+/** Return whether the ball rolls, and so has a way to look along. */
+function rolls({ velocity: [vx, vy] }: Frame): boolean {
+  return Math.hypot(vx, vy) > REST_M_S;
 }
 
 function wrapped(angle: number): number {
