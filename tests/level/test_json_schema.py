@@ -65,7 +65,7 @@ def test_editors_accept_every_valid_level(level: Level) -> None:
         ("coins: [{}]", "$.coins[0]"),
         ("coins: [{at: [1, 2]}]", "$.coins[0].at"),
         ("materials: {ice: {colour: red}}", "$.materials.ice.colour"),
-        ("place: [{of: a, repeat: {count: 0}}]", "$.place[0].repeat.count"),
+        ("place: [{of: a, repeat: {count: 0}}]", "$.place[0].repeat"),
         ("prefabs: {a: {boxs: []}}", "$.prefabs.a"),
         ("prefabs: {a: {boxes: [{att: 0}]}}", "$.prefabs.a.boxes[0]"),
         ("camera_triggers: [{kind: over, at: [0, 0, 0]}]", "$.camera_triggers[0].kind"),
