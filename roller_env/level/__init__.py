@@ -8,6 +8,7 @@ from roller_env.level.errors import LevelError, LevelWarning
 from roller_env.level.json_schema import level_json_schema
 from roller_env.level.load import (
     examine_level,
+    files_of,
     is_path,
     levels_directory,
     load_level,
@@ -24,6 +25,7 @@ __all__ = [
     "Problem",
     "check_level",
     "examine_level",
+    "files_of",
     "is_path",
     "level_json_schema",
     "level_warnings",

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -59,10 +59,10 @@ def load_level(source: str | os.PathLike[str] | Level | Mapping[str, Any]) -> Le
         return source
     if isinstance(source, Mapping):
         root = _tree(lambda: plain_tree(source))
-        level, doubts = _examined(_source(File("", "", root), None))
+        level, doubts = _examined(_source(with_included(File("", "", root), None)))
         _warn(doubts, stacklevel=3)
         return level
-    level, doubts = _examined(_read_source(_path_of(source)))
+    level, doubts = _examined(_source(_files(_path_of(source))))
     _warn(doubts, stacklevel=3)
     return level
 
@@ -81,9 +81,18 @@ def examine_level(source: str | os.PathLike[str], play: Play) -> tuple[Level, tu
     Raises:
         LevelError: it cannot be played.
     """
-    read = _read_source(_path_of(source))
+    read = _source(_files(_path_of(source)))
     level, doubts = _examined(read)
     return level, tuple(_in_file_order((*doubts, *_told(lint(level, play, _unit(read)), read))))
+
+
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Return a level's file, and those that it includes, if all of them can be read."""
+    try:
+        _, *included = _files(path)
+    except LevelError:
+        return (path,)
+    return (path, *(Path(file.name) for file in included))
 
 
 def is_path(source: str) -> bool:
@@ -106,20 +115,21 @@ def parse_level(text: str, filename: str = "<text>") -> Level:
         LevelError: the level has problems; all of them are in ``problems``.
     """
     root = _tree(lambda: read_tree(text, filename))
-    level, doubts = _examined(_source(File(filename, text, root), None))
+    level, doubts = _examined(_source(with_included(File(filename, text, root), None)))
     _warn(doubts, stacklevel=3)
     return level
 
 
-def _read_source(path: Path) -> Source:
+@uncollected()
+def _files(path: Path) -> list[File]:
     filename, text = str(path), decoded(_read(path), str(path))
-    return _source(File(filename, text, _tree(lambda: read_tree(text, filename))), path)
+    return with_included(File(filename, text, _tree(lambda: read_tree(text, filename))), path)
 
 
 @uncollected()
-def _source(file: File, path: Path | None) -> Source:
+def _source(files: Sequence[File]) -> Source:
     """Return what a file says together with those that it includes, all copies made."""
-    return expanded(with_included(file, path), _unit_of(file.root))
+    return expanded(files, _unit_of(files[0].root))
 
 
 def _tree(read: Callable[[], Node]) -> Node:
