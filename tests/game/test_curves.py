@@ -199,3 +199,33 @@ def test_a_ball_never_leaves_the_surface_and_hardly_sinks_in(
     found = clearance(level, places)
     assert found[20:].max() < gap
     assert found.min() > -depth
+
+
+@pytest.mark.parametrize(
+    ("physics", "hop"), [("rigid", 1e-3), ("accurate", 2e-3), ("default", 6e-3), ("fast", 9e-3)]
+)
+def test_a_ball_on_a_banked_spiral_hops_over_edges_that_bend_away_by_little(
+    physics: str, hop: float
+) -> None:
+    radius, fall, bank, begin = 4.0, 2.0, math.radians(15.0), 0.1
+    slope = -fall / (2.0 * math.pi * radius)
+    out = np.array([math.cos(begin), math.sin(begin), 0.0])
+    across = out + np.array([0.0, 0.0, math.tan(bank)])
+    along = np.array([-math.sin(begin), math.cos(begin), slope])
+    along /= np.linalg.norm(along)
+    up = np.cross(across, along)
+    up /= np.linalg.norm(up)
+    middle = radius * out + np.array([0.0, 0.0, fall * (1.0 - begin / (2.0 * math.pi))])
+    spiral = {"centre": (0, 0, fall), "radius": radius, "width": 2, "rise": -fall, "bank_deg": 15}
+    level = make_level(
+        start={"at": tuple((middle + (BALL_RADIUS_M + 0.02) * up).tolist())},
+        boxes=[],
+        spirals=[spiral],
+    )
+    # As fast as the bank carries it round on the level.
+    speed = math.sqrt(GRAVITY * radius * math.tan(bank))
+    game = rolling(level, physics, speed * along, -up, 1 / 60)
+    places = game.play(1.4)
+    assert np.abs(np.hypot(places[:, 0], places[:, 1]) - radius).max() < 0.9
+    assert math.atan2(places[-1, 1], places[-1, 0]) > 1.0
+    assert clearance(level, places)[25:].max() < hop
