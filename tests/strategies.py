@@ -197,9 +197,9 @@ def _scenery(draw: Draw, slot: int, origin: Origin, surface: st.SearchStrategy[s
         return Spiral(
             centre=(x, y, z),
             radius=1.0,
-            width=draw(numbers(0.1, 1.9)),
-            rise=draw(numbers(-1.0, 2.0)),
-            turn_deg=draw(st.sampled_from([-200.0, 90.0, 500.0])),
+            width=draw(numbers(0.1, 1.0)),
+            rise=draw(numbers(-1.0, 1.0)),
+            turn_deg=draw(st.sampled_from([-200.0, 180.0, 500.0])),
             bank_deg=draw(numbers(0.0, 45.0)),
             segments=draw(st.integers(6, 12)),
             material=material,

@@ -35,7 +35,10 @@ _SECTORS: Final = 6
 """Faces of a bowl's lowest ring; each further ring has two in each sector more, so that all faces
 are about as large: six nearly equilateral triangles meet at a corner."""
 
-Segments = Annotated[int, Field(strict=True, ge=2, le=180)]
+_SHORTEST_M: Final = 2.0 * MIN_LENGTH_M
+"""No face may have a shorter edge: so none is thinner than a solid may be."""
+
+_STEEPEST_DEG: Final = 60.0
 
 
 class HalfPipe(Piece):
@@ -47,7 +50,9 @@ class HalfPipe(Piece):
     arc_deg: Annotated[Number, Field(ge=10.0, le=300.0)] = Field(
         180.0, description="From rim to rim, as seen from the axis."
     )
-    segments: Segments = Field(36, description="How many faces there are from rim to rim.")
+    segments: Annotated[int, Field(strict=True, ge=2, le=180)] = Field(
+        36, description="How many faces there are from rim to rim."
+    )
     thickness: PositiveLength = Field(quants(8.0), description="Outwards from the surface.")
     material: MaterialName = "default"
     name: OptionalName = None
@@ -58,6 +63,8 @@ class HalfPipe(Piece):
             raise PydanticCustomError(
                 "upright_half_pipe", "start and end must differ in x or y; use a tube"
             )
+        bend = math.radians(self.arc_deg) / self.segments
+        _check_edge(2.0 * self.radius * math.sin(bend / 2.0))
         return self
 
     def count(self) -> Count:
@@ -98,6 +105,11 @@ class Bowl(Piece):
     material: MaterialName = "default"
     name: OptionalName = None
 
+    @model_validator(mode="after")
+    def _has_room_for_its_faces(self) -> Bowl:
+        _check_edge(self.radius * math.radians(self.arc_deg) / 2.0 / self.rings)
+        return self
+
     def count(self) -> Count:
         """Return the number of its faces."""
         return Count(_SECTORS * self.rings**2)
@@ -135,19 +147,38 @@ class Spiral(Piece):
     bank_deg: Annotated[Number, Field(ge=0.0, le=60.0)] = Field(
         0.0, description="By how much it leans inwards, so that the ball stays on it."
     )
-    segments: Segments = Field(72, description="How many pairs of faces a whole turn has.")
+    segments: Annotated[int, Field(strict=True, ge=6, le=180)] = Field(
+        72, description="How many pairs of faces a whole turn has."
+    )
     thickness: PositiveLength = Field(quants(8.0), description="Downwards from the surface.")
     material: MaterialName = "default"
     name: OptionalName = None
 
     @model_validator(mode="after")
-    def _leaves_the_axis_free(self) -> Spiral:
-        if self.radius - self.width / 2 < MIN_LENGTH_M:
+    def _can_be_rolled_on(self) -> Spiral:
+        if self.turn_deg == 0.0:
+            raise PydanticCustomError("spiral_without_turn", "turn_deg must not be 0; use a ramp")
+        inner, turn = self.radius - self.width / 2, math.radians(abs(self.turn_deg))
+        if inner < MIN_LENGTH_M:
             raise PydanticCustomError(
                 "spiral_too_wide", "the width must be less than twice the radius"
             )
-        if self.turn_deg == 0.0:
-            raise PydanticCustomError("spiral_without_turn", "turn_deg must not be 0; use a ramp")
+        slope = math.degrees(math.atan2(abs(self.rise), turn * inner))
+        if slope > _STEEPEST_DEG:
+            raise PydanticCustomError(
+                "spiral_too_steep",
+                "its inner edge rises by {found} degrees; wanted at most {most}: turn it farther, "
+                "or make the radius larger",
+                {"found": f"{slope:.3g}", "most": f"{_STEEPEST_DEG:g}"},
+            )
+        _check_edge(turn * inner / self._pairs)
+        upright = math.cos(math.radians(slope)) * math.cos(math.radians(self.bank_deg))
+        if self.thickness * upright < MIN_LENGTH_M:
+            raise PydanticCustomError(
+                "spiral_too_thin",
+                "where it is so steep it must be thicker than {least} mm",
+                {"least": f"{1000.0 * MIN_LENGTH_M / upright:.2g}"},
+            )
         return self
 
     @property
@@ -175,6 +206,16 @@ class Spiral(Piece):
             inner, outer = corners[0, pair : pair + 2], corners[1, pair : pair + 2]
             for face in ([inner[0], outer[0], outer[1]], [inner[0], outer[1], inner[1]]):
                 yield _solid(np.array(face), self.material, source)
+
+
+def _check_edge(length: float) -> None:
+    """Refuse faces with an edge of so little length, metres."""
+    if length < _SHORTEST_M:
+        raise PydanticCustomError(
+            "curve_too_fine",
+            "its faces would be only {found} mm long; wanted fewer or larger ones",
+            {"found": f"{1000.0 * length:.2g}"},
+        )
 
 
 def _strip(inner: Float64, outer: Float64, ring: int) -> Iterator[Float64]:

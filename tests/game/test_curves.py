@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydantic import ValidationError
 
 from roller_env.level import Level
 from roller_env.level.expand import expand
@@ -72,11 +73,11 @@ def clearance(level: Level, places: Float64) -> Float64:
             Spiral,
             centre=st.just((1.0, 2.0, 3.0)),
             radius=st.just(2.0),
-            width=st.floats(0.2, 3.9),
-            rise=st.floats(-3.0, 3.0),
-            turn_deg=st.sampled_from([-350.0, 40.0, 170.0]),
+            width=st.floats(0.2, 3.3),
+            rise=st.floats(-1.0, 1.0),
+            turn_deg=st.sampled_from([-350.0, 140.0, 170.0]),
             bank_deg=st.floats(0.0, 60.0),
-            segments=st.integers(4, 20),
+            segments=st.integers(6, 20),
         ),
     )
 )
@@ -94,6 +95,65 @@ def expected_joints(piece: Any) -> int:
         rim = 6 * piece.rings
         return (3 * piece.count().solids - rim) // 2
     return int(piece.count().solids) - 1
+
+
+SMALLEST = st.floats(0.001, 0.05)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.one_of(
+        st.tuples(
+            st.just(HalfPipe),
+            st.fixed_dictionaries(
+                {
+                    "start": st.just((0, 0, 0)),
+                    "end": st.tuples(SMALLEST, st.just(0), st.floats(-1, 1)),
+                    "radius": SMALLEST,
+                    "arc_deg": st.floats(10, 300),
+                    "segments": st.integers(2, 12),
+                    "thickness": SMALLEST,
+                }
+            ),
+        ),
+        st.tuples(
+            st.just(Bowl),
+            st.fixed_dictionaries(
+                {
+                    "at": st.just((0, 0, 0)),
+                    "radius": SMALLEST,
+                    "arc_deg": st.floats(10, 180),
+                    "rings": st.integers(1, 3),
+                    "thickness": SMALLEST,
+                }
+            ),
+        ),
+        st.tuples(
+            st.just(Spiral),
+            st.fixed_dictionaries(
+                {
+                    "centre": st.just((0, 0, 0)),
+                    "radius": SMALLEST,
+                    "width": SMALLEST,
+                    "rise": st.floats(-0.3, 0.3),
+                    "turn_deg": st.floats(-500, 500),
+                    "bank_deg": st.floats(0, 60),
+                    "segments": st.integers(6, 12),
+                    "thickness": SMALLEST,
+                }
+            ),
+        ),
+    )
+)
+def test_however_small_it_is_a_curve_is_refused_or_has_all_its_faces(
+    piece: tuple[Any, dict[str, Any]],
+) -> None:
+    kind, fields = piece
+    try:
+        curve = kind.model_validate(fields)
+    except ValidationError:
+        return
+    assert len(list(curve.solids(""))) == curve.count().solids
 
 
 @settings(deadline=None, max_examples=10)
