@@ -129,9 +129,13 @@ export class Input {
 
 /** Whether what has the focus does something of its own with a key. */
 function isTakenBy(target: EventTarget | null, { key }: KeyboardEvent): boolean {
-  if (target instanceof HTMLButtonElement) return key === "Enter" || key === " ";
+  if (target instanceof HTMLButtonElement && (key === "Enter" || key === " ")) return true;
   if (target instanceof HTMLSelectElement) return key !== "Escape";
-  return target instanceof HTMLInputElement && (key.startsWith("Arrow") || key === " ");
+  const inField = target instanceof HTMLInputElement;
+  if (key === " ") return inField;
+  // Panels scroll with the arrows, but on the start page they choose.
+  const inPanel = target instanceof Element && target.closest(".dialog:not(.start)") !== null;
+  return key.startsWith("Arrow") && (inField || inPanel);
 }
 
 /** Whether the page is used with fingers. */

@@ -83,7 +83,7 @@ export function wordOf(result: ResultMessage): string {
   if (!result.counts) return "Practice: this one does not count.";
   if (result.outcome !== "finish") return "";
   const left = result.coins_in_level - result.coins;
-  if (left > 0 && result.next === null) return `Every coin opens the next level: ${left} left.`;
+  if (left > 0 && result.next === null) return `The next level asks for every coin: ${left} left.`;
   return result.best_time ? "A new best time!" : "";
 }
 

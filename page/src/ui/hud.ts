@@ -36,9 +36,10 @@ export class Hud {
     this.reach.append(this.reachText);
     const tools = make("nav", { class: "hud-tools", "aria-label": "Game" });
     const tool = (icon: IconName, label: string, command: Command): void => {
-      this.buttons[command] = button("", "tool", () => giveCommand(command));
+      const one = button("", "tool", () => giveCommand(command));
+      this.buttons[command] = one;
       this.label(command, icon, label);
-      tools.append(this.buttons[command]);
+      tools.append(one);
     };
     tool("pause", "Pause (P)", "pause");
     tool("restart", "Restart (R)", "restart");
@@ -50,6 +51,11 @@ export class Hud {
     settings.title = "Settings";
     tools.append(settings);
     tool("help", "Help (H)", "help");
+    // After a click the keys are the game's again: Enter is not to press the same once more.
+    tools.addEventListener("click", ({ detail }) => {
+      if (detail > 0 && document.activeElement instanceof HTMLElement)
+        document.activeElement.blur();
+    });
     this.element = make("div", { class: "hud" }, this.panel, tools);
   }
 

@@ -40,9 +40,11 @@ export class Timeline {
     this.bar.addEventListener("change", () => this.sendSeek());
     const speeds = SPEEDS.map((one) => make("option", { value: String(one) }, `${one}×`));
     this.speed.append(...speeds);
-    this.speed.addEventListener("change", () =>
-      actions.send({ type: "speed", factor: Number(this.speed.value) }),
-    );
+    this.speed.addEventListener("change", () => {
+      actions.send({ type: "speed", factor: Number(this.speed.value) });
+      // A list that has the focus takes letters, which are to push the ball.
+      this.speed.blur();
+    });
     this.branch = button("Go on from here", "main", () => actions.send({ type: "resume" }));
     this.element = make(
       "section",
