@@ -68,7 +68,7 @@ export class Balls {
         : new SimpleMaterial([1, 1, 1], 1, 0.1, this.pattern),
     );
     this.ball.castShadow = true;
-    this.ghost = new Mesh(sphere, glassy("#cfe8ff", 0.42));
+    this.ghost = new Mesh(sphere, glassy("#d8ecff", 0.55));
     this.ghost.renderOrder = 2;
     const coarse = new SphereGeometry(radius, 20, 12);
     this.crowd = new InstancedMesh(coarse, glassy("#ffffff", 0.5), MAX_CROWD);

@@ -104,6 +104,8 @@ export class World {
   /** Show another scene. */
   load(scene: Scene): void {
     this.scene = scene;
+    this.quality.retry();
+    this.resize();
     this.build(scene);
     this.game.reset();
     this.cutNext = true;
