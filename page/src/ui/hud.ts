@@ -26,7 +26,7 @@ export class Hud {
   constructor(openSettings: () => void) {
     this.panel = make(
       "div",
-      { class: "panel score", "aria-hidden": "true" },
+      { class: "panel score" },
       make("div", { class: "score-line" }, this.points, this.time),
       make("div", { class: "score-line" }, this.coins, this.bar),
       this.reach,
@@ -114,7 +114,7 @@ export class Hud {
     const marks = [
       ...(frame?.recording ? ["● recording"] : []),
       ...(frame?.rewound && hello?.mode === "play" ? ["practice, does not count"] : []),
-      ...(frame && frame.speed !== 1 ? [`${frame.speed}× speed`] : []),
+      ...(frame && frame.speed !== 1 ? [`${Number(frame.speed.toPrecision(2))}× speed`] : []),
     ];
     setShown(this.marks, marks.length > 0);
     setText(this.marks, marks.join(" · "));
