@@ -99,6 +99,15 @@ describe("the camera that follows", () => {
     expect(eye.position.z).toBeGreaterThan(before + 0.3);
   });
 
+  it("looks down on where the ball will land, but not while it is thrown up", () => {
+    const deck = solidsOf(wall([0, 0, -6], [20, 20, 0.5]));
+    const pitch = () => Math.asin((eye.position.z - 0) / eye.position.length());
+    go([1, 0, 8], 1, deck);
+    expect(pitch()).toBeLessThan(0.6);
+    go([1, 0, -1], 1, deck);
+    expect(pitch()).toBeGreaterThan(1);
+  });
+
   it("sees the ball in front of any wall", () => {
     // A wall behind the ball, and a low roof over it, and both.
     const behind = wall([-1.5, 0, 0], [0.1, 5, 5]);

@@ -9,6 +9,7 @@ const DISTANCE_M = 3.9;
 const PITCH = rad(30);
 
 /** Pitches tried in turn where a wall covers the ball: ever higher over it, at last below. */
+const HIGHEST = rad(80);
 const PITCHES = [30, 45, 62, 80, 12].map(rad);
 
 /** A pitch will do from which so much of the distance is free. */
@@ -38,6 +39,16 @@ const AHEAD_EASE_S = 0.25;
 /** Rolling towards the camera, one sees more of the way from higher up. */
 const TOWARDS_PITCH = rad(24);
 
+/** In flight one looks down on where the ball will land, from further away: so much for a height,
+ * once it rises no faster than this; over nothing, once it falls. */
+const FLIGHT_PITCH = rad(42);
+const FLIGHT_DISTANCE_M = 2.5;
+const HIGH_M = 5;
+/** Of that height, what is no flight: the ball's own radius, and a hop. */
+const GROUNDED = 0.2;
+const RISES_M_S = 1.5;
+const FALLS_M_S = 2;
+
 const PITCH_EASE_S = 0.35;
 const OUT_EASE_S = 0.5;
 
@@ -45,6 +56,7 @@ export class FollowCamera {
   private yaw = 0;
   private pitch = PITCH;
   private distance = DISTANCE_M;
+  private reach = DISTANCE_M;
   private restS = 0;
   private readonly ahead = new Vector3();
   private readonly ball = new Vector3();
@@ -74,7 +86,9 @@ export class FollowCamera {
     this.ball.set(...frame.ball);
     this.turn(frame, elapsedS);
     this.lookAhead(frame, elapsedS);
-    const wanted = this.clearPitch(frame, solids);
+    const flight = this.flight(frame, solids);
+    this.reach = DISTANCE_M + FLIGHT_DISTANCE_M * flight;
+    const wanted = this.clearPitch(this.raised(frame) + FLIGHT_PITCH * flight, solids);
     this.pitch += (wanted - this.pitch) * easing(elapsedS, PITCH_EASE_S);
     const free = this.freeDistance(this.pitch, solids);
     // In at once, since a wall is between; out gently.
@@ -104,27 +118,39 @@ export class FollowCamera {
     this.ahead.lerp(this.way, easing(elapsedS, AHEAD_EASE_S));
   }
 
-  /** Return the first pitch from which the ball is seen, or the one with the most room. */
-  private clearPitch(frame: Frame, solids: Solids): number {
+  /** Return how high the ball flies, 0 to 1, if where it lands is what matters. */
+  private flight(frame: Frame, solids: Solids): number {
+    const rise = frame.velocity[2];
+    const ground = solids.below(this.ball);
+    if (ground === null) return rise < -FALLS_M_S ? 1 : 0;
+    const height = this.ball.z - ground.height;
+    return rise < RISES_M_S ? Math.min(Math.max(height / HIGH_M - GROUNDED, 0), 1) : 0;
+  }
+
+  /** Return by how much higher one looks since the ball rolls towards the camera. */
+  private raised(frame: Frame): number {
     const [vx, vy] = frame.velocity;
-    const speed = Math.hypot(vx, vy);
-    const towards = -(vx * Math.cos(this.yaw) + vy * Math.sin(this.yaw)) / Math.max(speed, 3);
-    const raised = TOWARDS_PITCH * Math.max(towards, 0);
+    const towards = -(vx * Math.cos(this.yaw) + vy * Math.sin(this.yaw));
+    return TOWARDS_PITCH * Math.min(Math.max(towards / FULL_TURN_M_S, 0), 1);
+  }
+
+  /** Return the first pitch from which the ball is seen, or the one with the most room. */
+  private clearPitch(raised: number, solids: Solids): number {
     let best = PITCH;
     let most = 0;
     for (const pitch of PITCHES) {
-      const tried = Math.min(pitch + raised, rad(80));
+      const tried = Math.min(pitch + raised, HIGHEST);
       const free = this.freeDistance(tried, solids);
-      if (free >= FREE_ENOUGH * DISTANCE_M) return tried;
+      if (free >= FREE_ENOUGH * this.reach) return tried;
       if (free > most) [best, most] = [tried, free];
     }
     return best;
   }
 
   private freeDistance(pitch: number, solids: Solids): number {
-    const way = this.backwards(pitch).multiplyScalar(DISTANCE_M + MARGIN_M);
-    const free = solids.free(this.ball, way) * (DISTANCE_M + MARGIN_M) - MARGIN_M;
-    return Math.min(Math.max(free, NEAREST_M), DISTANCE_M);
+    const reach = this.reach + MARGIN_M;
+    const free = solids.free(this.ball, this.backwards(pitch).multiplyScalar(reach));
+    return Math.min(Math.max(free * reach - MARGIN_M, NEAREST_M), this.reach);
   }
 
   /** Return the unit vector from the ball to the camera. */
