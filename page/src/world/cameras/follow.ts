@@ -15,6 +15,9 @@ const PITCHES = [30, 45, 62, 80, 12].map(rad);
 /** A pitch will do from which so much of the distance is free. */
 const FREE_ENOUGH = 0.75;
 
+/** How far below its middle the ball is still to be seen. */
+const FOOT_M = 0.28;
+
 /** What is kept between the camera and what it would else look through. */
 const MARGIN_M = 0.3;
 const NEAREST_M = 0.9;
@@ -60,6 +63,7 @@ export class FollowCamera {
   private restS = 0;
   private readonly ahead = new Vector3();
   private readonly ball = new Vector3();
+  private readonly foot = new Vector3();
   private readonly way = new Vector3();
   private readonly back = new Vector3();
 
@@ -84,6 +88,7 @@ export class FollowCamera {
    */
   look(frame: Frame, solids: Solids, elapsedS: number, eye: Eye): void {
     this.ball.set(...frame.ball);
+    this.foot.copy(this.ball).z -= FOOT_M;
     this.turn(frame, elapsedS);
     this.lookAhead(frame, elapsedS);
     const flight = this.flight(frame, solids);
@@ -147,9 +152,11 @@ export class FollowCamera {
     return best;
   }
 
+  /** Return how far from the ball one may be to see all of it. */
   private freeDistance(pitch: number, solids: Solids): number {
     const reach = this.reach + MARGIN_M;
-    const free = solids.free(this.ball, this.backwards(pitch).multiplyScalar(reach));
+    const way = this.backwards(pitch).multiplyScalar(reach);
+    const free = Math.min(solids.free(this.ball, way), solids.free(this.foot, way));
     return Math.min(Math.max(free * reach - MARGIN_M, NEAREST_M), this.reach);
   }
 
