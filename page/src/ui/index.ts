@@ -87,7 +87,7 @@ export class Ui {
       { class: "below" },
       this.hud.element,
       this.intro.element,
-      this.messages.element,
+      ...this.messages.elements,
       this.researchPanel.element,
       foot,
     );
