@@ -83,7 +83,8 @@ export class Timeline {
       setAttribute(this.bar, "min", String(timeline.first_s));
       setAttribute(this.bar, "max", String(Math.max(timeline.last_s, frame.timeS)));
     }
-    if (this.sought === null) this.bar.value = String(frame.timeS);
+    if (!seekable) this.bar.value = this.bar.max;
+    else if (this.sought === null) this.bar.value = String(frame.timeS);
     const last = seekable ? ` / ${formatTime(timeline.last_s)}` : "";
     setText(this.moment, formatTime(this.sought ?? frame.timeS) + last);
     const speed = String(SPEEDS.find((one) => Math.abs(one - frame.speed) < 1e-3) ?? "");
