@@ -75,10 +75,10 @@ def replay_html(replay: Replay) -> str:
     }
     return _PAGE.format(
         title=html.escape(title),
-        style=(page / "replay.css").read_text("utf-8"),
+        style=(page / "roller.css").read_text("utf-8"),
         # What ends a script within a text would end this one.
         data=json.dumps(data, allow_nan=False).replace("<", "\\u003c"),
-        program=_packed((page / "replay.js").read_bytes()),
+        program=_packed((page / "roller.js").read_bytes()),
     )
 
 

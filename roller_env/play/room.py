@@ -140,6 +140,7 @@ class Room:
         self._ended: list[tuple[EpisodeResult, bool]] = []
         self._agent_told_s = 0.0
         self._problems: Message | None = None
+        self._result: Message | None = None
         self._timeline_told: Message | None = None
         self._wishes: list[ToServer] = []
         self._woken = asyncio.Event()
@@ -152,7 +153,9 @@ class Room:
         if self._player is None:
             self._player = guest
         guest.tell(self._hello(guest))
-        for told in (self._level_message(), self._timeline(), self._problems):
+        ended = self._game is not None and self._game.phase is Phase.ENDED
+        result = self._result if ended else None
+        for told in (self._level_message(), self._timeline(), self._problems, result):
             if told is not None:
                 guest.tell(told)
         self._woken.set()
@@ -475,22 +478,22 @@ class Room:
             improved = self._records.add(game.level, game.preset, result, replay)
         if result.outcome == "not ended":
             return
-        self._tell(
-            message(
-                "result",
-                outcome=result.outcome,
-                coins=result.coins,
-                coins_in_level=len(expand(game.level).coins),
-                score_percent=result.score_percent,
-                time_s=result.time_s,
-                points=COIN_ON_PANELS * result.coins,
-                medal=result.medal(game.level.par_time_s),
-                best_time=improved.time,
-                best_coins=improved.coins,
-                counts=counts,
-                next=self._following() if result.success and result.score_percent == 100 else None,
-            )
+        whole = result.success and result.score_percent == 100.0
+        self._result = message(
+            "result",
+            outcome=result.outcome,
+            coins=result.coins,
+            coins_in_level=len(expand(game.level).coins),
+            score_percent=result.score_percent,
+            time_s=result.time_s,
+            points=COIN_ON_PANELS * result.coins,
+            medal=result.medal(game.level.par_time_s),
+            best_time=improved.time,
+            best_coins=improved.coins,
+            counts=counts,
+            next=self._following() if whole else None,
         )
+        self._tell(self._result)
 
     def _following(self) -> str | None:
         """Return the level after the one that is played, if there is one."""

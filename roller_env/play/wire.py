@@ -11,7 +11,7 @@ import struct
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from roller_env.arrays import Float64
 from roller_env.game.actions import KEY_AXES, KEY_CODES
@@ -158,9 +158,12 @@ def read_message(text: str) -> ToServer:
     Raises:
         ValueError: it is too long, or no message.
     """
-    if len(text.encode()) > MAX_MESSAGE_BYTES:
-        raise ValueError(f"found more than {MAX_MESSAGE_BYTES} bytes")
-    return _TO_SERVER.validate_json(text)
+    if len(text.encode(errors="replace")) > MAX_MESSAGE_BYTES:
+        raise ValueError(f"message: found more than {MAX_MESSAGE_BYTES} bytes")
+    try:
+        return _TO_SERVER.validate_json(text)
+    except ValidationError as error:
+        raise ValueError(f"message: {error.errors()[0]['msg']}") from None
 
 
 def message(kind: str, **fields: Any) -> dict[str, Any]:
