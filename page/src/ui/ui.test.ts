@@ -80,6 +80,8 @@ it("shows the level that the server has when that was away before it had loaded 
 it("keeps the start page while a level is loaded, and no other panel", () => {
   show({ frame: null, scene: null, level: null });
   expect(shown(".start")).toBe(true);
+  show({ frame: null, scene: null });
+  expect(shown(".start")).toBe(true);
   show({ frame: fakeFrame({ phase: "ended" }), result: RESULT });
   show({ frame: null, scene: null });
   expect(shown(".end") || shown(".start")).toBe(false);
