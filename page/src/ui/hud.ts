@@ -81,7 +81,8 @@ export class Hud {
     this.show("research", hello !== null && (hello.mode !== "watch" || frame.hasAgent));
     if (settings.muted) this.label("mute", "mute", "Sound on (M)");
     else this.label("mute", "sound", "Sound off (M)");
-    if (frame.phase === "paused") this.label("pause", "play", "Go on (P)");
+    const stands = frame.phase === "paused" || frame.phase === "ended";
+    if (stands) this.label("pause", "play", "Go on (P)");
     else this.label("pause", "pause", "Pause (P)");
   }
 

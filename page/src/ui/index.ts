@@ -21,7 +21,7 @@ import { Timeline } from "./timeline";
 const SEEK_S = 1;
 
 /** The panel that the game asks for, below what a person has opened. */
-export type Base = "start" | "pause" | "end" | null;
+type Base = "start" | "pause" | "end" | null;
 
 /**
  * Return the panel that the game asks for.
@@ -30,7 +30,7 @@ export type Base = "start" | "pause" | "end" | null;
  * @param research - whether the researcher's panels are open: they take the place of the pause's.
  * @param before - the one of the moment before; the start page stays while a level is loaded.
  */
-export function baseOf(view: View, research: boolean, before: Base): Base {
+function baseOf(view: View, research: boolean, before: Base): Base {
   const { hello, seat, frame, level, result } = view;
   if (hello === null || hello.mode === "replay") return null;
   const choosing = frame === null ? level === null || before === "start" : frame.phase === "start";

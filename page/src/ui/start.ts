@@ -77,18 +77,23 @@ export class StartPage extends Dialog {
   update(view: View): void {
     const { hello, level } = view;
     this.ghost.update(view);
-    setText(this.status, level === null ? "Loading …" : "");
     if (hello === null) return;
-    if (hello.levels !== this.levels) {
-      this.levels = hello.levels;
-      setShown(this.cards, hello.levels.length > 1);
-      this.element.classList.toggle("alone", hello.levels.length <= 1);
-      this.chosen ??= level?.name ?? null;
-      this.cards.replaceChildren(...hello.levels.map((row) => this.card(row)));
-      this.mark();
-    }
+    if (hello.levels !== this.levels) this.list(hello.levels);
     if (view.connection === "lost") this.asked = null;
     if (level !== this.level) this.follow(level);
+    setText(this.status, level === null || this.asked !== null ? "Loading …" : "");
+  }
+
+  /** Make the cards anew; one that has the focus keeps it. */
+  private list(levels: readonly LevelRow[]): void {
+    this.levels = levels;
+    const { activeElement } = document;
+    const focused = this.cards.contains(activeElement) && (activeElement as HTMLElement);
+    setShown(this.cards, levels.length > 1);
+    this.element.classList.toggle("alone", levels.length <= 1);
+    this.cards.replaceChildren(...levels.map((row) => this.card(row)));
+    this.mark();
+    if (focused) this.cardOf(focused.dataset.level ?? "")?.focus({ preventScroll: true });
   }
 
   override show(shown: boolean): void {
@@ -195,7 +200,7 @@ export class StartPage extends Dialog {
 }
 
 /** What is told of a level in a line. */
-export function factsOf(row: LevelRow): string[] {
+function factsOf(row: LevelRow): string[] {
   const par = row.par_time_s === null ? [] : [`par ${formatTime(row.par_time_s)}`];
   const best = row.best_time_s === null ? [] : [`best ${formatTime(row.best_time_s)}`];
   const tries = row.attempts > 0 ? [counted(row.attempts, "attempt")] : [];

@@ -6,7 +6,7 @@ import { button, make, setAttribute, setShown, setText } from "./dom";
 import { formatTime } from "./format";
 import { drawIcon } from "./icon";
 
-export const SPEEDS: readonly number[] = [0.1, 0.25, 0.5, 1, 2];
+const SPEEDS: readonly number[] = [0.1, 0.25, 0.5, 1, 2];
 
 /** A moment so near to the last one is the last one; seconds, less than any control step. */
 const AT_END_S = 5e-4;
@@ -70,11 +70,12 @@ export class Timeline {
     if (!shown || frame === null) return;
     const paused = frame.phase === "paused";
     const replay = hello?.mode === "replay";
-    const label = paused ? "Go on" : "Pause";
+    const stands = paused || frame.phase === "ended";
+    const label = stands ? "Go on" : "Pause";
     if (this.play.title !== label) {
       this.play.title = label;
       setAttribute(this.play, "aria-label", label);
-      this.play.replaceChildren(drawIcon(paused ? "play" : "pause"));
+      this.play.replaceChildren(drawIcon(stands ? "play" : "pause"));
     }
     this.step.disabled = !paused;
     const seekable = timeline !== null && (paused || replay);

@@ -68,6 +68,13 @@ it("begins the level that was chosen last when Enter is pressed", () => {
   expect(asked("main")).toEqual(["start"]);
 });
 
+it("keeps the focus on a card when the levels are told of anew", () => {
+  show({ frame: fakeFrame({ phase: "start" }) });
+  document.querySelector<HTMLElement>('[data-level="ice"]')?.focus();
+  show({ frame: fakeFrame({ phase: "start" }) });
+  expect(document.activeElement?.getAttribute("data-level")).toBe("ice");
+});
+
 it("shows the level that the server has when that was away before it had loaded another", () => {
   show({ frame: fakeFrame({ phase: "start" }) });
   giveCommand("forward");
