@@ -32,6 +32,9 @@ const TURN_S = 0.55;
 const TURN_AT_REST_S = 0.9;
 const MOST_TURN_RAD_S = rad(170);
 
+/** Cosine of how far off the view the ball rolls when the camera stops turning after it. */
+const TURNS_NO_MORE = Math.cos(rad(110));
+
 /** Where the ball will be so soon is kept in the picture. */
 const AHEAD_S = 0.22;
 const MOST_AHEAD_M = 1.5;
@@ -39,8 +42,9 @@ const MOST_AHEAD_M = 1.5;
 const AHEAD_UPWARDS = 0.4;
 const AHEAD_EASE_S = 0.25;
 
-/** Rolling towards the camera, one sees more of the way from higher up. */
-const TOWARDS_PITCH = rad(24);
+/** Rolling towards the camera, one sees more of the way from higher up and further away. */
+const TOWARDS_PITCH = rad(28);
+const TOWARDS_DISTANCE_M = 1.8;
 
 /** In flight one looks down on where the ball will land, from further away: so much for a height,
  * once it rises no faster than this; over nothing, once it falls. */
@@ -92,8 +96,9 @@ export class FollowCamera {
     this.turn(frame, elapsedS);
     this.lookAhead(frame, elapsedS);
     const flight = this.flight(frame, solids);
-    this.reach = DISTANCE_M + FLIGHT_DISTANCE_M * flight;
-    const wanted = this.clearPitch(this.raised(frame) + FLIGHT_PITCH * flight, solids);
+    const towards = this.towards(frame);
+    this.reach = DISTANCE_M + FLIGHT_DISTANCE_M * flight + TOWARDS_DISTANCE_M * towards;
+    const wanted = this.clearPitch(FLIGHT_PITCH * flight + TOWARDS_PITCH * towards, solids);
     this.pitch += (wanted - this.pitch) * easing(elapsedS, PITCH_EASE_S);
     const free = this.freeDistance(this.pitch, solids);
     // In at once, since a wall is between; out gently.
@@ -108,12 +113,13 @@ export class FollowCamera {
     const rolling = rolls(frame);
     this.restS = rolling ? 0 : this.restS + elapsedS;
     if (this.restS > 0 && this.restS < REST_S) return;
-    const error = wrapped((rolling ? Math.atan2(vy, vx) : 0) - this.yaw);
+    const error = (rolling ? Math.atan2(vy, vx) : 0) - this.yaw;
     const share = rolling
       ? easing(elapsedS, TURN_S) * Math.min(Math.hypot(vx, vy) / FULL_TURN_M_S, 1)
       : easing(elapsedS, TURN_AT_REST_S);
     const most = MOST_TURN_RAD_S * elapsedS;
-    this.yaw = wrapped(this.yaw + Math.min(Math.max(error * share, -most), most));
+    const turn = rolling ? sideways(error) : wrapped(error);
+    this.yaw = wrapped(this.yaw + Math.min(Math.max(turn * share, -most), most));
   }
 
   private lookAhead(frame: Frame, elapsedS: number): void {
@@ -132,11 +138,11 @@ export class FollowCamera {
     return rise < RISES_M_S ? Math.min(Math.max(height / HIGH_M - GROUNDED, 0), 1) : 0;
   }
 
-  /** Return by how much higher one looks since the ball rolls towards the camera. */
-  private raised(frame: Frame): number {
+  /** Return how fast the ball rolls towards the camera, 0 to 1. */
+  private towards(frame: Frame): number {
     const [vx, vy] = frame.velocity;
-    const towards = -(vx * Math.cos(this.yaw) + vy * Math.sin(this.yaw));
-    return TOWARDS_PITCH * Math.min(Math.max(towards / FULL_TURN_M_S, 0), 1);
+    const speed = -(vx * Math.cos(this.yaw) + vy * Math.sin(this.yaw));
+    return Math.min(Math.max(speed / FULL_TURN_M_S, 0), 1);
   }
 
   /** Return the first pitch from which the ball is seen, or the one with the most room. */
@@ -170,6 +176,17 @@ export class FollowCamera {
 /** Return whether the ball rolls, and so has a way to look along. */
 function rolls({ velocity: [vx, vy] }: Frame): boolean {
   return Math.hypot(vx, vy) > REST_M_S;
+}
+
+/**
+ * Return by how much to turn to a way that is so far off, radians.
+ *
+ * It is the sideways share of the speed, and nothing once the ball rolls towards the camera: keys
+ * may be relative to the view, and who holds S would else steer in a circle.
+ */
+function sideways(error: number): number {
+  const towards = (Math.cos(error) - TURNS_NO_MORE) / -TURNS_NO_MORE;
+  return Math.sin(error) * Math.min(Math.max(towards, 0), 1);
 }
 
 function wrapped(angle: number): number {
