@@ -57,6 +57,7 @@ const RISES_M_S = 1.5;
 const FALLS_M_S = 2;
 
 const PITCH_EASE_S = 0.35;
+const PITCH_EASE_COVERED_S = 0.1;
 const OUT_EASE_S = 0.5;
 
 export class FollowCamera {
@@ -99,11 +100,13 @@ export class FollowCamera {
     const towards = this.towards(frame);
     this.reach = DISTANCE_M + FLIGHT_DISTANCE_M * flight + TOWARDS_DISTANCE_M * towards;
     const wanted = this.clearPitch(FLIGHT_PITCH * flight + TOWARDS_PITCH * towards, solids);
-    this.pitch += (wanted - this.pitch) * easing(elapsedS, PITCH_EASE_S);
-    const free = this.freeDistance(this.pitch, solids);
-    // In at once, since a wall is between; out gently.
-    if (free < this.distance) this.distance = free;
-    else this.distance += (free - this.distance) * easing(elapsedS, OUT_EASE_S);
+    const free = this.freeDistance(this.ball, this.pitch, solids);
+    const pitchEaseS = free < FREE_ENOUGH * this.reach ? PITCH_EASE_COVERED_S : PITCH_EASE_S;
+    this.pitch += (wanted - this.pitch) * easing(elapsedS, pitchEaseS);
+    // In at once where a wall is between; out gently.
+    const room = this.freeDistance(this.ball, this.pitch, solids);
+    if (room < this.distance) this.distance = room;
+    else this.distance += (room - this.distance) * easing(elapsedS, OUT_EASE_S);
     eye.position.copy(this.ball).add(this.backwards(this.pitch).multiplyScalar(this.distance));
     eye.target.copy(this.ball).add(this.ahead);
   }
@@ -151,18 +154,20 @@ export class FollowCamera {
     let most = 0;
     for (const pitch of PITCHES) {
       const tried = Math.min(pitch + raised, HIGHEST);
-      const free = this.freeDistance(tried, solids);
+      const free = Math.min(
+        this.freeDistance(this.ball, tried, solids),
+        this.freeDistance(this.foot, tried, solids),
+      );
       if (free >= FREE_ENOUGH * this.reach) return tried;
       if (free > most) [best, most] = [tried, free];
     }
     return best;
   }
 
-  /** Return how far from the ball one may be to see all of it. */
-  private freeDistance(pitch: number, solids: Solids): number {
+  /** Return how far from a point of the ball one may be to see it. */
+  private freeDistance(point: Vector3, pitch: number, solids: Solids): number {
     const reach = this.reach + MARGIN_M;
-    const way = this.backwards(pitch).multiplyScalar(reach);
-    const free = Math.min(solids.free(this.ball, way), solids.free(this.foot, way));
+    const free = solids.free(point, this.backwards(pitch).multiplyScalar(reach));
     return Math.min(Math.max(free * reach - MARGIN_M, NEAREST_M), this.reach);
   }
 
