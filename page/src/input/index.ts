@@ -132,7 +132,7 @@ function isTakenBy(target: EventTarget | null, { key }: KeyboardEvent): boolean 
   if (target instanceof HTMLButtonElement && (key === "Enter" || key === " ")) return true;
   if (target instanceof HTMLSelectElement) return key !== "Escape";
   const inField = target instanceof HTMLInputElement;
-  if (key === " ") return inField;
+  if (key === " ") return inField && target.type === "checkbox";
   // Panels scroll with the arrows, but on the start page they choose.
   const inPanel = target instanceof Element && target.closest(".dialog:not(.start)") !== null;
   return key.startsWith("Arrow") && (inField || inPanel);
