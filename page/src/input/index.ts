@@ -33,7 +33,10 @@ export class Input {
     this.stick = new TouchStick(target, () => this.changed());
     window.addEventListener("keydown", (event) => this.keyDown(event));
     window.addEventListener("keyup", (event) => {
-      if (this.codes.delete(event.code)) this.tell();
+      // While Meta is held, macOS does not tell that other keys are let go.
+      if (event.key === "Meta") this.codes.clear();
+      this.codes.delete(event.code);
+      this.tell();
     });
     window.addEventListener("blur", () => this.leave());
     document.addEventListener("visibilitychange", () => {
@@ -68,7 +71,7 @@ export class Input {
     const command = commandOf(event.key, event.code, place);
     if (command !== null) {
       event.preventDefault();
-      if (!event.repeat || place !== "game") giveCommand(command);
+      if (!event.repeat || event.code.startsWith("Arrow")) giveCommand(command);
     } else if (event.code in DIRECTION_KEYS && place !== "replay") {
       if (event.code.startsWith("Arrow")) event.preventDefault();
       if (event.repeat) return;

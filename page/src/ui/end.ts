@@ -24,6 +24,7 @@ export class EndPanel extends Dialog {
   private readonly buttons: HTMLElement;
   private shown: ResultMessage | null = null;
 
+  /** @param actions - what the server is told by. */
   constructor(actions: Actions) {
     super("The game is over", "end");
     this.next = button("Next level", "main", () => actions.send({ type: "next" }));

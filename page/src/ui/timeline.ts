@@ -25,6 +25,7 @@ export class Timeline {
   private sought: number | null = null;
   private waiting = 0;
 
+  /** @param actions - what the server is told by. */
   constructor(private readonly actions: Actions) {
     this.play = button(drawIcon("pause"), "tool", () => giveCommand("pause"));
     this.step = button(drawIcon("step"), "tool", () => giveCommand("step"));
