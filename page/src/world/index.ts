@@ -119,8 +119,7 @@ export class World {
   resize(): void {
     const width = Math.max(this.canvas.clientWidth, 1);
     const height = Math.max(this.canvas.clientHeight, 1);
-    const ratio = Math.min(this.quality.effort.pixelRatio, window.devicePixelRatio);
-    this.renderer.setPixelRatio(ratio);
+    this.renderer.setPixelRatio(this.quality.pixelRatio(width, height, window.devicePixelRatio));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     const least = Math.tan((LEAST_WIDTH_OF_VIEW * Math.PI) / 360) / this.camera.aspect;
