@@ -1,14 +1,14 @@
 /** A replay in a file of its own: states that were recorded, played without a server. */
 
 import { between } from "./frames";
-import { begin, Page } from "./page";
+import { Page } from "./page";
 import type { Frame, Phase, ResultMessage, Scene, ToServer } from "./types";
 import { decodeFrame } from "./wire";
 
 const POINTS_PER_COIN = 10;
 
 /** What the HTML round this script has put there. */
-interface Recorded {
+export interface Recorded {
   /** base64 of gzip of the scene's JSON. */
   scene: string;
   /** base64 of gzip of frames, one after the other. */
@@ -150,9 +150,8 @@ async function unpack(base64: string): Promise<ArrayBuffer> {
   return new Response(unpacked).arrayBuffer();
 }
 
-async function start(root: HTMLElement): Promise<void> {
-  const recorded = window.ROLLER;
-  if (recorded === undefined) throw new Error("there is no replay in this file");
+/** Unpack a replay, and play it in an element. */
+export async function openReplay(root: HTMLElement, recorded: Recorded): Promise<void> {
   const scene = JSON.parse(new TextDecoder().decode(await unpack(recorded.scene))) as Scene;
   const data = await unpack(recorded.frames);
   const count = Math.floor(data.byteLength / recorded.frame_bytes);
@@ -162,5 +161,3 @@ async function start(root: HTMLElement): Promise<void> {
   );
   new Replay(root, recorded, scene, frames);
 }
-
-void begin(start);

@@ -19,6 +19,7 @@ export class GhostChoice {
   readonly element: HTMLElement;
   private readonly select = make("select", { class: "ghost" });
 
+  /** @param actions - what the server is told by. */
   constructor(actions: Actions) {
     this.select.append(...KINDS.map(([kind, text]) => make("option", { value: kind }, text)));
     this.element = make("label", { class: "field" }, make("span", {}, "Race against"), this.select);

@@ -39,6 +39,9 @@ const SUN_DISTANCE_M = 30;
 const SHADOW_REACH_M = 14;
 const SHADOW_PIXELS = 2048;
 
+/** How much of the sky is reflected. */
+const ENVIRONMENT_SHARE = 0.45;
+
 /** With no graphics card more pictures a second would take the game its processor. */
 const SOFTWARE_FRAME_S = 1 / 31;
 
@@ -54,6 +57,7 @@ export class World {
   private readonly world = new World3();
   private readonly camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.1, 1000);
   private readonly sun = new DirectionalLight("#fff1dc", 2.5);
+  private readonly skyLight = new HemisphereLight("#e9f1ff", "#a8b4c4");
   private environment: WebGLRenderTarget | null = null;
   private readonly software: boolean;
   private readonly quality: Quality;
@@ -81,9 +85,8 @@ export class World {
     this.camera.up.set(0, 0, 1);
     this.setSun();
     this.world.add(skyMesh(paintSky(this.renderer, TOWARDS_SUN, false)));
-    const skyLight = new HemisphereLight("#cfe3ff", "#8fa3bd", 0.75);
-    skyLight.position.set(0, 0, 1);
-    this.world.add(this.sun, this.sun.target, skyLight, new AmbientLight("#ffffff", 0.35));
+    this.skyLight.position.set(0, 0, 1);
+    this.world.add(this.sun, this.sun.target, this.skyLight, new AmbientLight("#ffffff", 0.35));
     this.orbit = new OrbitCamera(
       canvas,
       () => {
@@ -104,6 +107,8 @@ export class World {
   /** Show another scene. */
   load(scene: Scene): void {
     this.scene = scene;
+    this.quality.retry();
+    this.resize();
     this.build(scene);
     this.game.reset();
     this.cutNext = true;
@@ -114,8 +119,7 @@ export class World {
   resize(): void {
     const width = Math.max(this.canvas.clientWidth, 1);
     const height = Math.max(this.canvas.clientHeight, 1);
-    const ratio = Math.min(this.quality.effort.pixelRatio, window.devicePixelRatio);
-    this.renderer.setPixelRatio(ratio);
+    this.renderer.setPixelRatio(this.quality.pixelRatio(width, height, window.devicePixelRatio));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     const least = Math.tan((LEAST_WIDTH_OF_VIEW * Math.PI) / 360) / this.camera.aspect;
@@ -196,14 +200,18 @@ export class World {
   private build(scene: Scene): void {
     this.parts?.dispose();
     const { rich } = this.quality.effort;
-    if (rich && this.environment === null) {
+    // Without a graphics card it takes ten seconds to get ready.
+    const reflects = rich && !this.software;
+    if (reflects && this.environment === null) {
       const sky = paintSky(this.renderer, TOWARDS_SUN, true);
       const generator = new PMREMGenerator(this.renderer);
       this.environment = generator.fromCubemap(sky.texture);
       generator.dispose();
       sky.dispose();
     }
-    this.world.environment = rich ? (this.environment?.texture ?? null) : null;
+    this.world.environmentIntensity = ENVIRONMENT_SHARE;
+    this.world.environment = reflects ? (this.environment?.texture ?? null) : null;
+    this.skyLight.intensity = reflects ? 1 : 1.7;
     this.renderer.shadowMap.enabled = rich;
     this.sun.castShadow = rich;
     const anisotropy = rich ? Math.min(this.renderer.capabilities.getMaxAnisotropy(), 8) : 1;

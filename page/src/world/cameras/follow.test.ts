@@ -52,19 +52,44 @@ describe("the camera that follows", () => {
     expect(eye.position.z).toBeGreaterThan(1);
   });
 
-  it("turns to where the ball rolls, whichever way that is", () => {
-    for (const angle of [0.5, 1.5, 3, -1, -3]) {
+  it("turns to where the ball rolls, to either side", () => {
+    for (const angle of [0.5, 1.5, -1, -1.7]) {
       camera.cut(frameOf());
       go([4 * Math.cos(angle), 4 * Math.sin(angle), 0], 4);
       expect(Math.cos(yawOf(eye) - angle)).toBeGreaterThan(0.99);
     }
   });
 
+  it("does not turn to a ball that rolls towards it, but shows more of the way", () => {
+    go([0, 0, 0], 1);
+    const [height, distance] = [eye.position.z, eye.position.length()];
+    go([-4, 0.3, 0], 5);
+    expect(Math.abs(yawOf(eye))).toBeLessThan(0.1);
+    expect(eye.position.z).toBeGreaterThan(height + 1);
+    expect(eye.position.length()).toBeGreaterThan(distance + 1);
+  });
+
+  it("lets S be held with keys that are relative to it: the ball rolls back on one line", () => {
+    const ball: [number, number, number] = [0, 0, 0];
+    const velocity: [number, number, number] = [0, 0.05, 0];
+    for (let s = 0; s < 4; s += DT_S) {
+      camera.look(frameOf({ ball, velocity }), open, DT_S, eye);
+      // Pushed at 3 m/s2 along the nearest of eight directions, as the keys do.
+      const way = Math.round((yawOf(eye) + Math.PI) / (Math.PI / 4)) * (Math.PI / 4);
+      velocity[0] += 3 * DT_S * Math.cos(way);
+      velocity[1] += 3 * DT_S * Math.sin(way);
+      ball[0] += DT_S * velocity[0];
+      ball[1] += DT_S * velocity[1];
+    }
+    expect(ball[0]).toBeLessThan(-20);
+    expect(Math.abs(ball[1])).toBeLessThan(1);
+  });
+
   it("turns smoothly: never by more than five degrees from one picture to the next", () => {
     go([3, 0, 0], 1);
     let before = yawOf(eye);
     for (let i = 0; i < 240; i++) {
-      go([-6, 0.01, 0], DT_S);
+      go([-1, 6, 0], DT_S);
       expect(Math.cos(yawOf(eye) - before)).toBeGreaterThan(Math.cos((5 * Math.PI) / 180));
       before = yawOf(eye);
     }
@@ -92,11 +117,13 @@ describe("the camera that follows", () => {
     expect(eye.position.toArray()).toEqual([x, y, z]);
   });
 
-  it("keeps where the ball rolls in the picture: above it while it rolls towards the camera", () => {
-    go([0, 0, 0], 1);
-    const before = eye.position.z;
-    go([-4, 0, 0], 0.4);
-    expect(eye.position.z).toBeGreaterThan(before + 0.3);
+  it("looks down on where the ball will land, but not while it is thrown up", () => {
+    const deck = solidsOf(wall([0, 0, -6], [20, 20, 0.5]));
+    const pitch = () => Math.asin((eye.position.z - 0) / eye.position.length());
+    go([1, 0, 8], 1, deck);
+    expect(pitch()).toBeLessThan(0.6);
+    go([1, 0, -1], 1, deck);
+    expect(pitch()).toBeGreaterThan(1);
   });
 
   it("sees the ball in front of any wall", () => {
