@@ -69,6 +69,7 @@ class Replay {
       scene: "",
       control_dt_s: 1 / recorded.rate_hz,
       points_per_coin: POINTS_PER_COIN,
+      ghost: "none",
     };
     this.result = resultOf(recorded, scene);
     view.timeline = { type: "timeline", first_s: 0, last_s: this.lastS, can_branch: false };
