@@ -1,6 +1,6 @@
 /** Against whom one races. */
 
-import type { Actions, ToServer, View } from "../types";
+import type { Actions, LevelMessage, ToServer, View } from "../types";
 import { make, setShown } from "./dom";
 
 type GhostKind = Extract<ToServer, { type: "ghost" }>["kind"];
@@ -13,6 +13,7 @@ const KINDS: readonly [GhostKind, string][] = [
 
 /** The choice last made, which the start page and the pause panel share. */
 let chosen: GhostKind = "none";
+let level: LevelMessage | null = null;
 
 /** A choice of the ghost that rolls beside the ball. */
 export class GhostChoice {
@@ -32,6 +33,11 @@ export class GhostChoice {
   /** Show what is chosen; those who watch choose nothing. */
   update(view: View): void {
     setShown(this.element, view.seat === "player" && view.hello?.mode === "play");
+    if (view.level !== level) {
+      // The server knows it, also after a reload.
+      level = view.level;
+      chosen = level?.ghost ?? chosen;
+    }
     if (this.select.value !== chosen) this.select.value = chosen;
   }
 }
