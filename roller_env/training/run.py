@@ -39,13 +39,14 @@ from roller_env.training.files import (
 )
 from roller_env.training.pictures import draw_paths, film_episode
 from roller_env.training.policy import Policy, load_policy, save_policy
-from roller_env.training.ppo import has_spent_all, learn
+from roller_env.training.ppo import learn
 from roller_env.training.report import (
     advice,
     draw_learning_curve,
     markdown_table,
     write_evaluation,
 )
+from roller_env.training.schedule import has_spent_all
 
 EVALUATION_SEED_OFFSET: Final = 1_000_000
 """Added to a training's seed, so that an agent is judged on starts it was not trained on."""
