@@ -48,6 +48,9 @@ from roller_env.training.exploration import Journeys
 from roller_env.training.files import RunError, read_whole, write_atomically
 from roller_env.training.normalisation import running_moments, set_running_moments
 
+CLUSTER: Final = "cluster"
+"""Name in a checkpoint's state under which all is that a training on a cluster left."""
+
 Tree = dict[str, Any]
 """Names to arrays, to JSON's values, or to such trees."""
 
@@ -124,6 +127,9 @@ class Checkpoint:
         Raises:
             CheckpointError: the checkpoint is that of another learner.
         """
+        if CLUSTER in self.state:
+            message = "of a training on a cluster; go on with --cluster"
+            raise CheckpointError(f"{shown(self.file)}: {message}")
         try:
             _set_state(model, self.state)
         except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:

@@ -30,6 +30,7 @@ from stable_baselines3 import PPO
 
 from roller_env.problems import shown
 from roller_env.training.checkpoint import (
+    CLUSTER,
     Checkpoint,
     CheckpointError,
     Progress,
@@ -53,9 +54,6 @@ from roller_env.training.schedule import (
     learning_rate,
 )
 from roller_env.training.vector import RecipeVectorEnv
-
-_STATE: Final = "cluster"
-"""Key of a checkpoint's state under which all of a cluster's training is."""
 
 _TRAINING: Final = "training"
 """Key of RLlib's ``env_config`` under which runners find the training's configuration."""
@@ -137,12 +135,14 @@ class RecipeEnvRunner(SingleAgentEnvRunner):  # type: ignore[misc]
         """Return what became known since the last report.
 
         Returns:
-            ``steps`` made, the last infos of the episodes that ``ended``, and what all steps so far
-            showed, of this runner and before the last update of others, as `running_moments`.
+            ``steps`` made, the last infos of the episodes that ``ended``, the ``node`` where this
+            is, and what all steps so far showed, of this runner and before the last update of
+            others, as `running_moments`.
         """
         ended, self.env.ended = self.env.ended, []
         steps, self._steps = self._steps, 0
-        return {"steps": steps, "ended": ended, **running_moments(self.env.normaliser)}
+        told = {"steps": steps, "ended": ended, "node": ray.get_runtime_context().get_node_id()}
+        return {**told, **running_moments(self.env.normaliser)}
 
     def snapshot(self) -> tuple[int, Tree]:
         """Return this runner's number, and all that its future depends on but the weights."""
@@ -259,6 +259,7 @@ def algorithm_config(config: TrainingConfig) -> Any:
     return (
         rllib_ppo.PPOConfig(algo_class=RecipePPO)
         .environment("roller_env:Roller/Level-v0", env_config={_TRAINING: config})
+        .api_stack(enable_rl_module_and_learner=True, enable_env_runner_and_connector_v2=True)
         .framework("torch")
         .env_runners(
             env_runner_cls=RecipeEnvRunner,
@@ -329,14 +330,13 @@ def learn(config: TrainingConfig, files: RunFiles, address: str) -> tuple[PPO, P
     model, checkpoint = new_model(config, make_environments(config)), None
     if files.checkpoint.exists():
         checkpoint = load_checkpoint(files.checkpoint)
-        if _STATE not in checkpoint.state:
-            raise CheckpointError(
-                f"{shown(files.checkpoint)}: of one machine's training; go on without --cluster"
-            )
+        if CLUSTER not in checkpoint.state:
+            message = "of one machine's training; go on without --cluster"
+            raise CheckpointError(f"{shown(files.checkpoint)}: {message}")
     if checkpoint is None or not is_complete(config, checkpoint.progress):
         with _connected(config, address):
             checkpoint = _Driver(config, files, model, checkpoint).train()
-    state = checkpoint.state[_STATE]
+    state = checkpoint.state[CLUSTER]
     weights = {name: torch.from_numpy(value) for name, value in state["policy"].items()}
     model.policy.load_state_dict(from_rllib(config, weights))
     normaliser = model.get_vec_normalize_env()
@@ -395,11 +395,12 @@ class _Driver:
             games: dict[str, Tree] = {}
             progress = Progress()
         else:
-            learnt = checkpoint.state[_STATE]
+            learnt = checkpoint.state[CLUSTER]
             self._moments = learnt["normaliser"]
-            games = learnt["runners"]
+            games = learnt.get("runners", {})
             progress = checkpoint.progress
         self._recording = Recording(config, progress)
+        self._logger = new_logger(files, progress)
         self._steps = progress.steps
         self._on_learners(lambda learner: learner.restore(learnt))
         self._runners.sync_weights(from_worker_or_learner_group=self._learners)
@@ -408,13 +409,12 @@ class _Driver:
     def train(self) -> Checkpoint:
         """Train to the end; return the last checkpoint, which is written as well."""
         config, recording = self._config, self._recording
-        logger = new_logger(self._files, recording.progress)
         answered_s = time.monotonic()
         try:
             while not is_complete(config, recording.progress):
                 if self._update():
                     answered_s = time.monotonic()
-                    recording.update(self._steps, logger)
+                    recording.update(self._steps, self._logger)
                 elif time.monotonic() - answered_s > config.cluster.patience_s:
                     raise RunError(
                         f"no runner has answered for {config.cluster.patience_s:g} s "
@@ -427,7 +427,7 @@ class _Driver:
             return checkpoint
         finally:
             recording.close()
-            logger.close()
+            self._logger.close()
             self._algorithm.stop()
 
     def _update(self) -> bool:
@@ -440,10 +440,12 @@ class _Driver:
         self._on_runners(lambda runner: runner.set_state({_MOMENTS: moments}), local=True)
         self._algorithm.train()
         reports = self._on_runners(lambda runner: runner.report())
-        steps = sum(report["steps"] for report in reports)
+        steps = sum(int(report["steps"]) for report in reports)
         self._steps += steps
         self._recording.add(info for report in reports for info in report["ended"])
         self._moments = _merged(moments, reports)
+        self._logger.record("cluster/runners", len(reports))
+        self._logger.record("cluster/nodes", len({report["node"] for report in reports}))
         return steps > 0
 
     def _checkpoint(self) -> Checkpoint:
@@ -454,7 +456,7 @@ class _Driver:
         }
         state = {**learnt, "normaliser": self._moments, "runners": games}
         files, progress = self._files, self._recording.progress
-        return Checkpoint(files.checkpoint, self._config, progress, {_STATE: state})
+        return Checkpoint(files.checkpoint, self._config, progress, {CLUSTER: state})
 
     def _on_runners(self, do: Callable[[Any], Any], *, local: bool = False) -> list[Any]:
         """Return what is done on each runner that can be reached, and with the driver's own."""

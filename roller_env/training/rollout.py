@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -42,7 +43,7 @@ class Rollout:
     def __init__(self, envs: RecipeVectorEnv) -> None:
         """Begin where the environments are."""
         self._envs = envs
-        self._columns: tuple[list[npt.NDArray[Any]], ...] = ([], [], [], [], [], [], [])
+        self._kept: dict[str, list[npt.NDArray[Any]]] = defaultdict(list)
         self._final: list[npt.NDArray[Any] | None] = []
 
     def step(self, actions: Int64, logits: Float32, log_probability: Float32) -> None:
@@ -53,28 +54,40 @@ class Rollout:
             logits: (N, 9) by which they were drawn.
             log_probability: (N,) of the actions.
         """
-        before = self._envs.observations
-        _, rewards, terminated, truncated, told = self._envs.step(actions)
-        step = (before, actions, rewards, logits, log_probability, terminated, truncated)
-        for column, values in zip(self._columns, step, strict=True):
-            column.append(values)
+        kept = {"observations": self._envs.observations, "actions": actions, "logits": logits}
+        kept["log_probability"] = log_probability
+        _, kept["rewards"], kept["terminated"], kept["truncated"], told = self._envs.step(actions)
+        for name, values in kept.items():
+            self._kept[name].append(values)
         self._final.append(told.get("final_obs"))
 
     def pieces(self) -> Iterator[Piece]:
         """Return all steps, row by row, cut where episodes ended."""
-        columns = [np.stack(column, axis=1) for column in self._columns]
-        observations, *between, terminated, truncated = columns
-        steps, last = len(self._final), self._envs.observations
+        kept = {name: np.stack(values, axis=1) for name, values in self._kept.items()}
+        over = kept["terminated"] | kept["truncated"]
+        steps = len(self._final)
         for row in range(self._envs.num_envs):
             begin = 0
-            for end in (*np.flatnonzero(terminated[row] | truncated[row]).tolist(), steps - 1):
-                if begin == steps:
-                    continue
-                final = self._final[end]
-                is_over = bool(terminated[row, end] or truncated[row, end])
-                after = final[row] if final is not None and is_over else last[row]
-                part = (row, slice(begin, end + 1))
-                seen = np.concatenate([observations[part], after[None]])
-                ends = bool(terminated[row, end]), bool(truncated[row, end])
-                yield Piece(seen, *(column[part] for column in between), *ends)
-                begin = end + 1
+            for end in (np.flatnonzero(over[row]) + 1).tolist():
+                yield self._piece(kept, row, slice(begin, end))
+                begin = end
+            if begin < steps:
+                yield self._piece(kept, row, slice(begin, steps))
+
+    def _piece(self, kept: dict[str, npt.NDArray[Any]], row: int, steps: slice) -> Piece:
+        last = steps.stop - 1
+        ends = bool(kept["terminated"][row, last]), bool(kept["truncated"][row, last])
+        after = self._envs.observations[row]
+        if any(ends):
+            final = self._final[last]
+            assert final is not None
+            after = final[row]
+        return Piece(
+            observations=np.concatenate([kept["observations"][row, steps], after[None]]),
+            actions=kept["actions"][row, steps],
+            rewards=kept["rewards"][row, steps],
+            logits=kept["logits"][row, steps],
+            log_probability=kept["log_probability"][row, steps],
+            terminated=ends[0],
+            truncated=ends[1],
+        )

@@ -64,14 +64,12 @@ class RecipeVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
         self.observations = self.normaliser.reset()
         return self.observations, {}
 
-    def step(
-        self, actions: npt.NDArray[Any]
-    ) -> tuple[Any, Float32, Bool, Bool, dict[str, npt.NDArray[Any]]]:
+    def step(self, actions: npt.NDArray[Any]) -> tuple[Any, Float32, Bool, Bool, dict[str, Any]]:
         """Step every row; see `RollerVectorEnv.step`. Rewards are scaled."""
         observations, rewards, dones, infos = self.normaliser.step(actions)
         self.observations = observations
         truncated = np.zeros(self.num_envs, dtype=bool)
-        told: dict[str, npt.NDArray[Any]] = {}
+        told: dict[str, Any] = {}
         rows = np.flatnonzero(dones)
         if len(rows):
             told = {"final_obs": np.full(self.num_envs, None, dtype=object), "_final_obs": dones}
@@ -80,7 +78,7 @@ class RecipeVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
                 truncated[row] = info[TRUNCATED]
                 told["final_obs"][row] = info.pop("terminal_observation")
                 self.ended.append(info)
-        return observations, np.float32(rewards), dones & ~truncated, truncated, told
+        return observations, rewards.astype(np.float32), dones & ~truncated, truncated, told
 
     def snapshot(self) -> Tree:
         """Return all that the future depends on, as arrays and JSON's values."""
