@@ -13,7 +13,6 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import Any, Final
 
 import gymnasium as gym
@@ -42,6 +41,7 @@ from roller_env.training.checkpoint import (
 from roller_env.training.cluster import AUTO, LOCAL
 from roller_env.training.config import TrainingConfig
 from roller_env.training.files import RunError, RunFiles
+from roller_env.training.network import network_of, network_spaces
 from roller_env.training.normalisation import merged, running_moments, set_running_moments
 from roller_env.training.ppo import make_environments, new_model
 from roller_env.training.recording import Recording, new_logger
@@ -53,7 +53,7 @@ from roller_env.training.schedule import (
     is_complete,
     learning_rate,
 )
-from roller_env.training.vector import RecipeVectorEnv
+from roller_env.training.vector import RecipeVectorEnv, part_of
 
 _TRAINING: Final = "training"
 """Key of RLlib's ``env_config`` under which runners find the training's configuration."""
@@ -237,21 +237,6 @@ class RecipePPO(rllib_ppo.PPO):  # type: ignore[misc]
         return restored
 
 
-def part_of(config: TrainingConfig, number: int) -> TrainingConfig:
-    """Return what one of the runners plays, with seeds of its own.
-
-    Args:
-        config: of the whole training.
-        number: of the runner, from 0 on.
-    """
-    rows = config.num_envs // config.cluster.runners
-    # A runner has one CPU. Its rows and its explorers take the seeds after those of the runner
-    # before; there are fewer explorers than rows.
-    alone = replace(config.environment, num_threads=1)
-    changes = {"num_envs": rows, "seed": config.seed + 2 * rows * number, "environment": alone}
-    return config.model_copy(update=changes)
-
-
 def algorithm_config(config: TrainingConfig) -> Any:
     """Return RLlib's configuration for a training."""
     ppo, cluster = config.ppo, config.cluster
@@ -333,6 +318,7 @@ def learn(config: TrainingConfig, files: RunFiles, address: str) -> tuple[PPO, P
         if CLUSTER not in checkpoint.state:
             message = "of one machine's training; go on without --cluster"
             raise CheckpointError(f"{shown(files.checkpoint)}: {message}")
+        _check_weights(config, checkpoint)
     if checkpoint is None or not is_complete(config, checkpoint.progress):
         with _connected(config, address):
             checkpoint = _Driver(config, files, model, checkpoint).train()
@@ -343,6 +329,17 @@ def learn(config: TrainingConfig, files: RunFiles, address: str) -> tuple[PPO, P
     assert normaliser is not None
     set_running_moments(normaliser, state["normaliser"])
     return model, checkpoint.progress
+
+
+def _check_weights(config: TrainingConfig, checkpoint: Checkpoint) -> None:
+    """Refuse the weights of other networks here, where it can be told, and not in a learner."""
+    try:
+        found = checkpoint.state[CLUSTER]["policy"]
+        weights = {name: torch.from_numpy(value) for name, value in found.items()}
+        network_of(config, *network_spaces(config, None), from_rllib(config, weights))
+    except (LookupError, TypeError, ValueError) as error:
+        message = f"not of a training with this configuration ({error})"
+        raise CheckpointError(f"{shown(checkpoint.file)}: {message}") from None
 
 
 @contextmanager
@@ -397,7 +394,9 @@ class _Driver:
         else:
             learnt = checkpoint.state[CLUSTER]
             self._moments = learnt["normaliser"]
-            games = learnt.get("runners", {})
+            # The games of another number of runners do not fit, and begin anew.
+            same = checkpoint.config.cluster.runners == config.cluster.runners
+            games = learnt.get("runners", {}) if same else {}
             progress = checkpoint.progress
         self._recording = Recording(config, progress)
         self._logger = new_logger(files, progress)

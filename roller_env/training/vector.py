@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -17,6 +18,21 @@ from roller_env.training.config import TrainingConfig
 from roller_env.training.curriculum import StartStateCurriculum
 from roller_env.training.normalisation import running_moments, set_running_moments
 from roller_env.training.ppo import make_environments, new_normaliser
+
+
+def part_of(config: TrainingConfig, number: int) -> TrainingConfig:
+    """Return what one of the runners plays, with seeds of its own.
+
+    Args:
+        config: of the whole training.
+        number: of the runner, from 0 on.
+    """
+    rows = config.num_envs // config.cluster.runners
+    # A runner has one CPU. Its rows and its explorers take the seeds after those of the runner
+    # before; there are fewer explorers than rows.
+    alone = replace(config.environment, num_threads=1)
+    changes = {"num_envs": rows, "seed": config.seed + 2 * rows * number, "environment": alone}
+    return config.model_copy(update=changes)
 
 
 class RecipeVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
