@@ -321,7 +321,7 @@ def learn(config: TrainingConfig, files: RunFiles, address: str) -> tuple[PPO, P
         _check_weights(config, checkpoint)
     if checkpoint is None or not is_complete(config, checkpoint.progress):
         with _connected(config, address):
-            checkpoint = _Driver(config, files, model, checkpoint).train()
+            checkpoint = Driver(config, files, model, checkpoint).train()
     state = checkpoint.state[CLUSTER]
     weights = {name: torch.from_numpy(value) for name, value in state["policy"].items()}
     model.policy.load_state_dict(from_rllib(config, weights))
@@ -368,7 +368,7 @@ def _connected(config: TrainingConfig, address: str) -> Iterator[None]:
         ray.shutdown()
 
 
-class _Driver:
+class Driver:
     """Makes updates, one after the other, and keeps what must not be lost."""
 
     def __init__(
@@ -403,7 +403,7 @@ class _Driver:
         self._steps = progress.steps
         self._on_learners(lambda learner: learner.restore(learnt))
         self._runners.sync_weights(from_worker_or_learner_group=self._learners)
-        self._on_runners(lambda runner: runner.go_on(games))
+        self.on_runners(lambda runner: runner.go_on(games))
 
     def train(self) -> Checkpoint:
         """Train to the end; return the last checkpoint, which is written as well."""
@@ -411,7 +411,7 @@ class _Driver:
         answered_s = time.monotonic()
         try:
             while not is_complete(config, recording.progress):
-                if self._update():
+                if self.update():
                     answered_s = time.monotonic()
                     recording.update(self._steps, self._logger)
                 elif time.monotonic() - answered_s > config.cluster.patience_s:
@@ -425,20 +425,24 @@ class _Driver:
                     recording.checkpoint_written()
             return checkpoint
         finally:
-            recording.close()
-            self._logger.close()
-            self._algorithm.stop()
+            self.stop()
 
-    def _update(self) -> bool:
+    def stop(self) -> None:
+        """End the runners, the learners, the display and the logs."""
+        self._recording.close()
+        self._logger.close()
+        self._algorithm.stop()
+
+    def update(self) -> bool:
         """Let one update be made; return whether there was anything to learn from."""
         config, progress = self._config, self._recording.progress
         rate = learning_rate(config)(1.0 - finality(config, progress))
         entropy = entropy_coefficient(config, progress)
         moments = self._moments
         self._on_learners(lambda learner: learner.set_rates(rate, entropy))
-        self._on_runners(lambda runner: runner.set_state({_MOMENTS: moments}), local=True)
+        self.on_runners(lambda runner: runner.set_state({_MOMENTS: moments}), local=True)
         self._algorithm.train()
-        reports = self._on_runners(lambda runner: runner.report())
+        reports = self.on_runners(lambda runner: runner.report())
         steps = sum(int(report["steps"]) for report in reports)
         self._steps += steps
         self._recording.add(info for report in reports for info in report["ended"])
@@ -451,13 +455,13 @@ class _Driver:
         """Return all that a training depends on; games that a lost runner played are not there."""
         learnt = self._on_learners(lambda learner: learner.snapshot())[0]
         games = {
-            str(number): tree for number, tree in self._on_runners(lambda runner: runner.snapshot())
+            str(number): tree for number, tree in self.on_runners(lambda runner: runner.snapshot())
         }
         state = {**learnt, "normaliser": self._moments, "runners": games}
         files, progress = self._files, self._recording.progress
         return Checkpoint(files.checkpoint, self._config, progress, {CLUSTER: state})
 
-    def _on_runners(self, do: Callable[[Any], Any], *, local: bool = False) -> list[Any]:
+    def on_runners(self, do: Callable[[Any], Any], *, local: bool = False) -> list[Any]:
         """Return what is done on each runner that can be reached, and with the driver's own."""
         told = self._runners.foreach_env_runner(
             do, local_env_runner=local, timeout_seconds=self._config.cluster.patience_s
