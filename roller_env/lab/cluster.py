@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -29,9 +29,11 @@ from roller_env.training.files import RunFiles
 from roller_env.training.logs import STEPS, read_progress
 from roller_env.training.ppo import make_environments, new_model
 
-ADDRESS: Final = "127.0.0.1:16379"
-_NODES: Final = ("127.0.0.1", "127.0.0.2")
-"""Where the head and the other node listen, both this machine's."""
+_NODES: Final = ("127.0.0.2", "127.0.0.3")
+"""Where the head and the other node are, both this machine's; Ray takes 127.0.0.1 for the address
+that others reach it by."""
+
+ADDRESS: Final = f"{_NODES[0]}:6399"
 
 _TRAIN: Final = Path(__file__).resolve().parents[2] / "scripts" / "train.py"
 _OBJECT_STORE_BYTES: Final = 2 * 10**8
@@ -56,14 +58,15 @@ class Node:
 
     def __init__(self, number: int) -> None:
         """Start the head, number 0, or another."""
-        if number == 0:
-            where = ("--head", f"--port={ADDRESS.rpartition(':')[2]}", "--include-dashboard=false")
-        else:
-            where = (f"--address={ADDRESS}",)
+        port = ADDRESS.rpartition(":")[2]
+        head = ["--head", f"--port={port}", "--include-dashboard=false"]
         self._process = subprocess.Popen(
             [
-                *(str(Path(sys.executable).with_name("ray")), "start", "--block", *where),
+                *(str(Path(sys.executable).with_name("ray")), "start", "--block"),
+                *(head if number == 0 else [f"--address={ADDRESS}"]),
                 *(f"--node-ip-address={_NODES[number]}", "--num-cpus=1"),
+                # Any that are free: both nodes would else begin with the same.
+                *("--min-worker-port=0", "--max-worker-port=0"),
                 f"--object-store-memory={_OBJECT_STORE_BYTES}",
             ],
             env=_ENVIRONMENT,
@@ -75,16 +78,9 @@ class Node:
     def kill(self) -> None:
         """End it as a power failure does: every process at once, none is asked."""
         for process in [*_descendants(self._process.pid), self._process.pid]:
-            with_no_error(lambda process=process: os.kill(process, signal.SIGKILL))
+            with suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
         self._process.wait()
-
-
-def with_no_error(do: Callable[[], object]) -> None:
-    """Do what may find that a process has ended already."""
-    try:
-        do()
-    except ProcessLookupError:
-        pass
 
 
 def _descendants(process: int) -> list[int]:
@@ -111,7 +107,7 @@ def two_nodes() -> Iterator[list[Node]]:
     try:
         for number in range(2):
             nodes.append(Node(number))
-            wait(f"node {number}", lambda count=number + 1: alive_nodes() == count)
+            wait(f"node {number}", lambda: alive_nodes() == len(nodes))
         yield nodes
     finally:
         for node in reversed(nodes):
@@ -120,7 +116,10 @@ def two_nodes() -> Iterator[list[Node]]:
 
 def alive_nodes() -> int:
     """Return how many nodes the cluster has; 0 if there is none."""
-    say = f"import ray; ray.init('{ADDRESS}', logging_level=50); print(sum(n['Alive'] for n in ray.nodes()))"
+    say = (
+        f"import ray; ray.init({ADDRESS!r}, logging_level=50);"
+        "print(sum(node['Alive'] for node in ray.nodes()))"
+    )
     said = subprocess.run(
         [sys.executable, "-c", say],
         env=_ENVIRONMENT,
@@ -209,7 +208,7 @@ class Training:
 
     def kill(self) -> None:
         """End it, asking nobody."""
-        with_no_error(self._process.kill)
+        self._process.kill()
         self._process.wait()
 
     def finish(self) -> None:
@@ -316,11 +315,14 @@ def measure(config: TrainingConfig, directory: Path, updates: int) -> Costs:
     directory.mkdir(parents=True, exist_ok=True)
     model = new_model(config, make_environments(config))
     driver = rllib.Driver(config, RunFiles(directory), model, None)
+
+    def cpu_of_runners() -> float:
+        return float(sum(driver.on_runners(lambda _: time.process_time())))
+
     try:
         for _ in range(2):
             driver.update()
         walls, drivers, runners, samplings = [], [], [], []
-        cpu_of_runners = lambda: sum(driver.on_runners(lambda _: time.process_time()))  # noqa: E731
         for _ in range(updates):
             runner_s, driver_s, wall_s = cpu_of_runners(), time.process_time(), time.monotonic()
             driver.update()

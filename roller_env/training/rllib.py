@@ -380,6 +380,8 @@ class Driver:
     ) -> None:
         self._config = config
         self._files = files
+        # It would tell that its new API stack is new.
+        logging.getLogger("ray.rllib").setLevel(logging.ERROR)
         self._algorithm = algorithm_config(config).build_algo()
         self._runners = self._algorithm.env_runner_group
         self._learners = self._algorithm.learner_group
