@@ -61,13 +61,15 @@ def main(arguments: Arguments) -> None:
                 asked = (f"level={arguments.level}", *settings, f"cluster.runners={runners}")
                 config = load_config(recipe(), asked)
                 updates = 2 if arguments.quick else arguments.updates
-                directory = arguments.runs / f"cluster-{runners}"
-                costs.append(cluster.measure(config, directory, updates))
+                costs.append(cluster.measure(config, updates))
                 rows += cluster.measured(costs[-1])
         for cores, learners in ((8, 1), (8, 4), (64, 1), (64, 24)):
             rows.append(cluster.reckoned(costs[-1], cores, learners, bytes_per_s=1.25e8))
         training = cluster.Training(arguments.runs, arguments.level, settings)
-        rows += cluster.trial(nodes, training, to_the_end=not arguments.quick)
+        try:
+            rows += cluster.trial(nodes, training, to_the_end=not arguments.quick)
+        finally:
+            training.kill()
     arguments.out.mkdir(parents=True, exist_ok=True)
     cluster.write(rows, arguments.out / "cluster.csv")
     print(cluster.shown(rows))
