@@ -31,13 +31,13 @@ class Arguments:
     """Start two nodes, measure on them, let them come and go under a training."""
 
     quick: bool = False
-    """A small training that does not go to its end, and few updates measured."""
+    """A small training that does not go to its end, and one round measured."""
 
     level: str = "bridge"
     """That is trained."""
 
-    updates: int = 10
-    """Measured with one runner, and with two."""
+    rounds: int = 3
+    """In which each number of runners is measured."""
 
     runs: Path = Path("runs")
     """Directory of the runs."""
@@ -49,6 +49,26 @@ class Arguments:
 SMALL = ("num_envs=64", "ppo.epochs=2", "checkpoint_interval_s=2")
 
 
+GIGABIT = 1.25e8
+"""Bytes a second of the network of the machines that are reckoned with."""
+
+
+def measured(arguments: Arguments, settings: tuple[str, ...]) -> list[cluster.Costs]:
+    """Return what updates cost with one runner, with two, and with two and larger batches."""
+    asked = (
+        ("cluster.runners=1",),
+        ("cluster.runners=2",),
+        ("cluster.runners=2", "ppo.batch_size=2048"),
+    )
+    # They take turns, since a machine that others use is not the same for all.
+    rounds: list[list[cluster.Costs]] = [[] for _ in asked]
+    for _ in range(1 if arguments.quick else arguments.rounds):
+        for costs, words in zip(rounds, asked, strict=True):
+            config = load_config(recipe(), (f"level={arguments.level}", *settings, *words))
+            costs.append(cluster.measure(config, updates=4))
+    return [cluster.middle(costs) for costs in rounds]
+
+
 def main(arguments: Arguments) -> None:
     """Do what the command line says."""
     torch.set_num_threads(1)
@@ -56,15 +76,11 @@ def main(arguments: Arguments) -> None:
     rows: list[cluster.Row] = []
     with cluster.two_nodes() as nodes:
         with cluster.connected():
-            costs = []
-            for runners in (1, 2):
-                asked = (f"level={arguments.level}", *settings, f"cluster.runners={runners}")
-                config = load_config(recipe(), asked)
-                updates = 2 if arguments.quick else arguments.updates
-                costs.append(cluster.measure(config, updates))
-                rows += cluster.measured(costs[-1])
-        for cores, learners in ((8, 1), (8, 4), (64, 1), (64, 24)):
-            rows.append(cluster.reckoned(costs[-1], cores, learners, bytes_per_s=1.25e8))
+            one, two, large = measured(arguments, settings)
+        model = cluster.Model.of(two, large)
+        rows += [*cluster.measured(one), *cluster.measured(two), *model.parts()]
+        for runners, learners, scale in ((7, 1, 1), (7, 1, 4), (63, 1, 1), (56, 8, 16)):
+            rows.append(model.speed(runners, learners, scale, bytes_per_s=GIGABIT))
         training = cluster.Training(arguments.runs, arguments.level, settings)
         try:
             rows += cluster.trial(nodes, training, to_the_end=not arguments.quick)

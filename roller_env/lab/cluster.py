@@ -17,7 +17,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from statistics import median
 from typing import Final
@@ -284,6 +284,8 @@ class Costs:
     Attributes:
         runners: how many.
         samples: of an update.
+        batch: samples of a gradient step.
+        epochs: passes over the samples.
         wall_s: of an update.
         sampling_s: wall seconds of which the driver waited for the runners.
         runner_cpu_s: CPU seconds of an update, all runners together.
@@ -294,6 +296,8 @@ class Costs:
 
     runners: int
     samples: int
+    batch: int
+    epochs: int
     wall_s: float
     sampling_s: float
     runner_cpu_s: float
@@ -343,6 +347,8 @@ def _measure(config: TrainingConfig, files: RunFiles, updates: int) -> Costs:
     return Costs(
         runners=config.cluster.runners,
         samples=config.steps_per_update,
+        batch=config.ppo.batch_size,
+        epochs=config.ppo.epochs,
         wall_s=median(walls),
         sampling_s=median(samplings),
         runner_cpu_s=median(runners),
@@ -366,27 +372,80 @@ def measured(costs: Costs) -> list[Row]:
     ]
 
 
-def reckoned(costs: Costs, cores: int, learners: int, bytes_per_s: float) -> Row:
-    """Return the speed that costs would give on so many cores. Never run: a model on paper.
+@dataclass(frozen=True, slots=True)
+class Model:
+    """What an update would take on other machines. Nothing of it was ever run.
 
-    An update is synchronous: first all play, each a part, then all samples pass through the
-    network and the driver, then the learners learn, each a part. What learners tell each other
-    is left out.
+    An update is synchronous: first all runners play, each its part; then all samples pass through
+    the network and the driver; then the learners learn, each its part of every batch. What learners
+    tell each other is left out, and so is that some runner is always the last.
 
-    Args:
-        costs: measured.
-        cores: in all, each of which plays or learns.
-        learners: of them; one: the driver.
-        bytes_per_s: of the driver's network.
+    Attributes:
+        step_s: CPU seconds for a runner to play a step.
+        pack_s: CPU seconds for the driver to take a step's sample up.
+        sample_bytes: of a step's sample.
+        gradient_s: CPU seconds of a gradient step, whatever its batch.
+        pass_s: CPU seconds more for each sample of its batch.
+        samples: of an update.
+        batch: samples of a gradient step.
+        epochs: passes over the samples.
     """
-    step_s = costs.runner_cpu_s / costs.samples
-    learn_s = costs.driver_cpu_s / costs.samples
-    send_s = costs.transfer_bytes / costs.samples / bytes_per_s
-    pack_s = costs.transfer_cpu_s / costs.samples
-    runners = cores - learners
-    speed = 1.0 / (step_s / runners + send_s + pack_s + learn_s / learners)
-    what = f"{cores} cores: {runners} play, {learners} learn{'s' * (learners == 1)}"
-    return Row(what, round(speed), "steps/s", "model")
+
+    step_s: float
+    pack_s: float
+    sample_bytes: float
+    gradient_s: float
+    pass_s: float
+    samples: int
+    batch: int
+    epochs: int
+
+    @staticmethod
+    def of(small: Costs, large: Costs) -> Model:
+        """Return the model of two measurements that differ in the batch alone."""
+        steps = [costs.epochs * costs.samples / costs.batch for costs in (small, large)]
+        gradient_s = (small.driver_cpu_s - large.driver_cpu_s) / (steps[0] - steps[1])
+        passes = small.epochs * small.samples
+        return Model(
+            step_s=small.runner_cpu_s / small.samples,
+            pack_s=small.transfer_cpu_s / small.samples,
+            sample_bytes=small.transfer_bytes / small.samples,
+            gradient_s=gradient_s,
+            pass_s=(small.driver_cpu_s - steps[0] * gradient_s) / passes,
+            samples=small.samples,
+            batch=small.batch,
+            epochs=small.epochs,
+        )
+
+    def parts(self) -> list[Row]:
+        """Return what the model is made of."""
+        return [
+            Row("a gradient step, of any batch", round(1e3 * self.gradient_s, 2), "ms of CPU"),
+            Row("and for each sample of it", round(1e6 * self.pass_s, 2), "us of CPU"),
+        ]
+
+    def speed(self, runners: int, learners: int, scale: int, bytes_per_s: float) -> Row:
+        """Return the speed, in steps a second, on a core for each runner and learner.
+
+        Args:
+            runners: that play.
+            learners: that learn; one: the driver.
+            scale: times the environments and the batch of what was measured.
+            bytes_per_s: of the driver's network.
+        """
+        samples, batch = scale * self.samples, scale * self.batch
+        play_s = samples * self.step_s / runners
+        send_s = samples * (self.pack_s + self.sample_bytes / bytes_per_s)
+        gradient_steps = self.epochs * samples / batch
+        learn_s = gradient_steps * (self.gradient_s + self.pass_s * batch / learners)
+        what = f"{runners + learners} cores ({runners} runners, learning on {learners}), "
+        what += "the recipe" if scale == 1 else f"{scale} times its environments and batch"
+        return Row(what, round(samples / (play_s + send_s + learn_s)), "steps/s", "model")
+
+
+def middle(rounds: list[Costs]) -> Costs:
+    """Return the medians of several measurements of the same."""
+    return Costs(**{f.name: median(getattr(one, f.name) for one in rounds) for f in fields(Costs)})
 
 
 def write(rows: list[Row], file: Path) -> None:
