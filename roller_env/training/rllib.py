@@ -193,9 +193,13 @@ class RecipeLearner(PPOTorchLearner):  # type: ignore[misc]
         self._optimizer_lr_schedules[optimizer] = fixed
         self._set_optimizer_lr(optimizer, rate)
 
+    def _network(self) -> Any:
+        """Return the module itself; one of several learners has it in a wrapper."""
+        return self._module[_MODULE].unwrapped()
+
     def snapshot(self) -> Tree:
         """Return weights, by RLlib's names, and what Adam has found."""
-        weights = self._module[_MODULE].state_dict()
+        weights = self._network().state_dict()
         moments = self.get_optimizer(_MODULE).state_dict()["state"]
         return {
             "policy": {name: values.cpu().numpy().copy() for name, values in weights.items()},
@@ -219,7 +223,9 @@ class RecipeLearner(PPOTorchLearner):  # type: ignore[misc]
         }
         check_moments(moments, [p for group in optimizer.param_groups for p in group["params"]])
         weights = {name: torch.from_numpy(value.copy()) for name, value in tree["policy"].items()}
-        self._module[_MODULE].load_state_dict(weights, strict=False)
+        # Besides weights the module has constants, which Stable-Baselines3's has not.
+        network = self._network()
+        network.load_state_dict({**network.state_dict(), **weights})
         optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
 
 
