@@ -79,15 +79,19 @@ class RecipeEnvRunner(SingleAgentEnvRunner):  # type: ignore[misc]
     RLlib's own runner appends step by step to an episode a row, and starts a row anew in a step of
     its own, in which it lets the others go on; here rows start anew as `RecipeVectorEnv` does it,
     and a rollout becomes episodes when it is over.
+
+    Attributes:
+        moments: what scaled observations and rewards when the driver last said it.
     """
 
+    moments: Tree | None = None
     _steps = 0
 
     def make_env(self) -> None:
         """Make the part that belongs to this runner's number."""
         training: TrainingConfig = self.config.env_config[_TRAINING]
-        # The driver's own runner, number 0, plays nothing.
-        self.env = RecipeVectorEnv(part_of(training, max(self.worker_index - 1, 0)))
+        # RLlib counts runners from 1; number 0 is the driver's own, which plays nothing.
+        self.env = RecipeVectorEnv(part_of(training, self.worker_index - 1))
         self.num_envs = self.env.num_envs
         self._needs_initial_reset = True
 
@@ -158,7 +162,7 @@ class RecipeEnvRunner(SingleAgentEnvRunner):  # type: ignore[misc]
     def get_state(self, *args: Any, **kwargs: Any) -> dict[str, Any]:
         """Return what another runner needs to take this one's place."""
         state: dict[str, Any] = super().get_state(*args, **kwargs)
-        if hasattr(self, "moments"):
+        if self.moments is not None:
             state[_MOMENTS] = self.moments
         return state
 
@@ -166,9 +170,10 @@ class RecipeEnvRunner(SingleAgentEnvRunner):  # type: ignore[misc]
         """Take up what RLlib sends, and what scales observations and rewards."""
         super().set_state(state)
         if _MOMENTS in state:
-            self.moments = state[_MOMENTS]
+            self.moments = moments = state[_MOMENTS]
+            # The driver's own runner has no environments.
             if self.env is not None:
-                set_running_moments(self.env.normaliser, self.moments)
+                set_running_moments(self.env.normaliser, moments)
 
 
 class RecipeLearner(PPOTorchLearner):  # type: ignore[misc]
