@@ -66,6 +66,7 @@ def measured(arguments: Arguments, settings: tuple[str, ...]) -> list[cluster.Co
         for costs, words in zip(rounds, asked, strict=True):
             config = load_config(recipe(), (f"level={arguments.level}", *settings, *words))
             costs.append(cluster.measure(config, updates=4))
+            print(costs[-1], flush=True)
     return [cluster.middle(costs) for costs in rounds]
 
 
@@ -81,12 +82,14 @@ def main(arguments: Arguments) -> None:
         rows += [*cluster.measured(one), *cluster.measured(two), *model.parts()]
         for runners, learners, scale in ((7, 1, 1), (7, 1, 4), (63, 1, 1), (56, 8, 16)):
             rows.append(model.speed(runners, learners, scale, bytes_per_s=GIGABIT))
+        # What is measured is kept, whatever becomes of the trial.
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        cluster.write(rows, arguments.out / "cluster.csv")
         training = cluster.Training(arguments.runs, arguments.level, settings)
         try:
             rows += cluster.trial(nodes, training, to_the_end=not arguments.quick)
         finally:
             training.kill()
-    arguments.out.mkdir(parents=True, exist_ok=True)
     cluster.write(rows, arguments.out / "cluster.csv")
     print(cluster.shown(rows))
 

@@ -360,7 +360,7 @@ def _measure(config: TrainingConfig, files: RunFiles, updates: int) -> Costs:
 
 def measured(costs: Costs) -> list[Row]:
     """Return the rows of what was measured."""
-    name, n = f"{costs.runners} runner{'s' * (costs.runners > 1)}", costs.samples
+    name, n = f"{costs.runners:g} runner{'s' * (costs.runners > 1)}", costs.samples
     return [
         Row(f"{name}: speed", round(n / costs.wall_s), "steps/s of wall time"),
         Row(f"{name}: an update", round(costs.wall_s, 3), "s of wall time"),

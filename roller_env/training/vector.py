@@ -29,7 +29,7 @@ def part_of(config: TrainingConfig, number: int) -> TrainingConfig:
     """
     rows = config.num_envs // config.cluster.runners
     # A runner has one CPU. Its rows and its explorers take the seeds after those of the runner
-    # before; there are fewer explorers than rows.
+    # before; there are no more explorers than rows.
     alone = replace(config.environment, num_threads=1)
     changes = {"num_envs": rows, "seed": config.seed + 2 * rows * number, "environment": alone}
     return config.model_copy(update=changes)
