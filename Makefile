@@ -67,6 +67,8 @@ lint: $(READY) ## check style, types and the direction of imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	@# As on Windows, for the names that only a POSIX system has.
+	$(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32 roller_env
 	$(BIN)/lint-imports
 
 format: $(READY) ## let ruff format the code and mend what it can

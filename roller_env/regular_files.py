@@ -12,6 +12,8 @@ import stat
 from pathlib import Path
 from typing import Final
 
+from roller_env.platforms import AT_ONCE
+
 _KINDS: Final = {
     stat.S_IFIFO: "a pipe",
     stat.S_IFSOCK: "a socket",
@@ -49,7 +51,7 @@ def read_regular_file(path: Path, most_bytes: int) -> bytes:
 
 
 def _open_at_once(path: str, flags: int) -> int:
-    return os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY)
+    return os.open(path, flags | AT_ONCE)
 
 
 def _check_kind(mode: int) -> None:

@@ -20,6 +20,7 @@ from typing import Annotated, Final, Literal
 import tyro
 
 from roller_env.config import EnvConfig
+from roller_env.platforms import ENDING_SIGNALS
 from roller_env.play.app import GamePlugin, ScreenPlugin, level_choices
 from roller_env.play.scene import Quality
 from roller_env.play.server import (
@@ -118,7 +119,7 @@ def play(arguments: Arguments) -> int:
     if arguments.viewer == "web":
         check_address(arguments.host, arguments.port)
     # When its terminal is closed, the game still writes what was recorded.
-    for number in (signal.SIGTERM, signal.SIGHUP):
+    for number in ENDING_SIGNALS:
         signal.signal(number, signal.default_int_handler)
     config, agent = game_of(arguments)
     keeper = ReplayKeeper(directory, "human" if agent is None else "agent and human")
@@ -149,7 +150,7 @@ def write_record(keeper: ReplayKeeper, record: str | None) -> int:
     problems: tuple[str, ...] = ()
     if record is not None:
         # Whoever closes the terminal or shuts the machine down asks more than once.
-        for number in (signal.SIGTERM, signal.SIGHUP):
+        for number in ENDING_SIGNALS:
             signal.signal(number, signal.SIG_IGN)
         written = datasets.to_minari_by_level(keeper.replays, record)
         lines += [f"data set: {name}" for name in written.names]

@@ -31,6 +31,8 @@ from typing import Any, Final
 
 from mujoco.studio import launch_thread, messages, plugin, viewer_handle, viewer_protocol
 
+from roller_env.platforms import ENDING_SIGNALS
+
 LOOPBACK: Final = "127.0.0.1"
 DEFAULT_PORT: Final = 8080
 TITLE: Final = "Roller"
@@ -215,7 +217,7 @@ def _signals_between_steps() -> Iterator[threading.Event]:
         signal.signal(number, signal.default_int_handler)
         asked.set()
 
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    numbers = (signal.SIGINT, *ENDING_SIGNALS)
     before = {number: signal.signal(number, remember) for number in numbers}
     try:
         yield asked
