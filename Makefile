@@ -16,11 +16,13 @@ BIN    := $(VENV)/bin
 PEERS  := .venv-peers
 # One environment for each supported Python.
 MATRIX := .venv-matrix
+# One for each library that is tried on Roller; each goes when it has been.
+CLIENTS := .venv-clients
 # Newer than both files it depends on exactly when the environment is complete.
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup train play test coverage matrix lint format docs benchmark clean
+.PHONY: help setup train play test coverage matrix clients lint format docs dist benchmark clean
 .DELETE_ON_ERROR:
 
 help: ## show this list
@@ -63,6 +65,9 @@ coverage: $(READY) ## run the tests, and say which lines of the package they lea
 matrix: $(READY) ## try the wheel with every supported Python found here, and the oldest Gymnasium
 	@$(BIN)/python scripts/matrix.py
 
+clients: $(READY) ## let other libraries learn on Roller, each in an environment of its own
+	@$(BIN)/python scripts/clients.py $(ARGS)
+
 lint: $(READY) ## check style, types and the direction of imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -79,6 +84,13 @@ docs: $(READY) ## build the documentation into site/; a dead link is an error
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "site/index.html"
 
+dist: $(READY) ## build the sdist, the wheel from the sdist, and check both
+	@rm -rf dist
+	@$(BIN)/python -m hatchling build --target sdist
+	@$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation \
+		--wheel-dir dist dist/*.tar.gz
+	@$(BIN)/python -m twine check --strict dist/*
+
 benchmark: $(READY) $(PEERS)/.ready ## measure against physics alone and other environments
 	@$(BIN)/python scripts/benchmark.py $(ARGS)
 
@@ -89,5 +101,5 @@ $(PEERS)/.ready: scripts/benchmark-peers.txt
 	@touch $@
 
 clean: ## remove the environments and caches; runs/ stays
-	rm -rf $(VENV) $(PEERS) $(MATRIX) build dist site .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(PEERS) $(MATRIX) $(CLIENTS) build dist site .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,7 +1,7 @@
 """PPO in one file, in CleanRL's manner: nothing between the reader and the algorithm but torch.
 
-CleanRL's own scripts are copied, not installed, and written for Gymnasium 0.29: they need
-``autoreset_mode=SAME_STEP`` with newer ones, and to read ``infos["final_info"]`` as arrays, as below.
+CleanRL's own scripts are copied, not installed, and written for Gymnasium 0.29. With newer ones
+they need ``autoreset_mode=SAME_STEP``, and to read ``infos["final_info"]`` as arrays, as below.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from torch.distributions import Categorical
 class Args:
     env_id: str = "roller_env:Roller/Flat-v0"
     seed: int = 1
-    total_timesteps: int = 32_768
+    total_timesteps: int = 16_384
     learning_rate: float = 1e-3
     num_envs: int = 8
     num_steps: int = 128
@@ -38,7 +38,9 @@ class Args:
 
 def make_env(args: Args) -> Any:
     def thunk() -> gym.Env[Any, Any]:
-        env = gym.make(args.env_id, reward="shaped", physics="rigid", max_episode_steps=300)
+        env = gym.make(
+            args.env_id, reward="shaped", physics="rigid", control_dt_s=0.1, max_episode_steps=150
+        )
         return gym.wrappers.RecordEpisodeStatistics(env)
 
     return thunk

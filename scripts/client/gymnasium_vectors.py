@@ -97,7 +97,7 @@ def check_wrappers() -> list[str]:
 def learn(policies: int = 64, elite: int = 8, generations: int = 12) -> list[float]:
     """Search linear policies by the cross-entropy method; return every policy's return."""
     envs: Any = gym.make_vec(
-        ID, policies, reward="shaped", physics="rigid", max_episode_steps=200
+        ID, policies, reward="shaped", physics="rigid", control_dt_s=0.1, max_episode_steps=100
     )
     envs = vector.NormalizeObservation(vector.RecordEpisodeStatistics(envs, buffer_length=10**6))
     rng = np.random.default_rng(0)
