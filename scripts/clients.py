@@ -3,14 +3,14 @@
 Every client is two files in scripts/client/: NAME.py, what a user of that library would write, and
 NAME.txt, the versions it needs beside or instead of those of constraints.txt (NAME-VERSION.txt, if
 one script is tried with several). Each gets an environment of its own in .venv-clients/, where it
-meets Roller as pip installs it. A script prints one line of JSON: what of the library was ``used``
-and the ``returns`` of its training's episodes, in order; they must rise. A client that has a row in
-docs/results/clients.csv is not tried again.
+meets Roller as pip installs it. A script prints a line of JSON for every training: what of the
+library was ``used`` and the ``returns`` of its episodes, in order; they must rise. A client that
+has rows in docs/results/clients.csv is not tried again.
 
 Examples::
 
     python scripts/clients.py
-    python scripts/clients.py torchrl_ppo skrl_ppo     # again, whether or not there is a row
+    python scripts/clients.py torchrl_ppo skrl_ppo     # again, rows or not
     python scripts/clients.py --show
 """
 
@@ -127,8 +127,8 @@ def versions(python: Path, client: str) -> str:
     return matrix.run(python, "-c", code, *wanted, directory=PLACE).strip()
 
 
-def try_client(client: str) -> dict[str, str]:
-    """Install a client, let it learn, and return its row.
+def try_client(client: str) -> list[dict[str, str]]:
+    """Install a client, let it learn, and return its rows.
 
     Raises:
         ClientError: it failed, or its returns did not rise by `MARGIN`.
@@ -144,54 +144,70 @@ def try_client(client: str) -> dict[str, str]:
         version = versions(python, client)
     except subprocess.CalledProcessError as failure:
         raise ClientError(f"{client}: failed\n{failure.stdout}") from None
-    report = json.loads(re.findall(r"^\{.*\}$", said, flags=re.M)[-1])
-    first, last = first_and_last_fifth(report["returns"])
-    if last < first + MARGIN:
-        raise ClientError(f"{client}: the return went from {first:.2f} to {last:.2f}\n{said}")
-    return {
-        "client": client,
-        "versions": version,
-        "used": report["used"],
-        "episodes": str(len(report["returns"])),
-        "return_first": f"{first:.2f}",
-        "return_last": f"{last:.2f}",
-        "install_s": f"{installed - begun:.0f}",
-        "run_s": f"{ended - installed:.0f}",
-        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
-    }
+    rows = []
+    for used, returns in reports(said):
+        first, last = first_and_last_fifth(returns)
+        if last < first + MARGIN:
+            means = f"the mean return went from {first:.2f} to {last:.2f}"
+            raise ClientError(f"{client}: {used}: {means}; wanted {MARGIN} more")
+        rows.append(
+            {
+                "client": client,
+                "versions": version,
+                "used": used,
+                "episodes": str(len(returns)),
+                "return_first": f"{first:.2f}",
+                "return_last": f"{last:.2f}",
+                "install_s": f"{installed - begun:.0f}",
+                "run_s": f"{ended - installed:.0f}",
+                "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+            }
+        )
+    return rows
+
+
+def reports(said: str) -> list[tuple[str, list[float]]]:
+    """Return what a script used and its returns, for every training that it reports.
+
+    Raises:
+        ClientError: it reports none.
+    """
+    lines = [json.loads(line) for line in said.splitlines() if line.startswith('{"used"')]
+    if not lines:
+        raise ClientError(f"found no report; wanted a line of JSON a training\n{said}")
+    return [(line["used"], line["returns"]) for line in lines]
 
 
 def first_and_last_fifth(returns: Sequence[float]) -> tuple[float, float]:
     """Return the mean return of the first and of the last fifth of all episodes.
 
     Raises:
-        ValueError: there are fewer than ten, which say nothing.
+        ClientError: there are fewer than ten, which say nothing.
     """
     if len(returns) < 10:
-        raise ValueError(f"found {len(returns)} episodes; wanted 10 or more")
+        raise ClientError(f"found {len(returns)} episodes; wanted 10 or more")
     fifth = len(returns) // 5
     return fmean(returns[:fifth]), fmean(returns[-fifth:])
 
 
-def read_rows() -> dict[str, dict[str, str]]:
-    """Return the rows that there are, by client."""
+def read_rows() -> list[dict[str, str]]:
+    """Return the rows that there are."""
     if not TABLE.exists():
-        return {}
+        return []
     with TABLE.open(encoding="utf-8", newline="") as stream:
-        return {row["client"]: row for row in csv.DictReader(stream)}
+        return list(csv.DictReader(stream))
 
 
-def write_rows(rows: dict[str, dict[str, str]]) -> None:
+def write_rows(rows: list[dict[str, str]]) -> None:
     """Write the table, and what docs/clients.md shows of it."""
     with TABLE.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
         writer.writeheader()
-        writer.writerows(rows[name] for name in sorted(rows))
+        writer.writerows(rows)
     page = PAGE.read_text(encoding="utf-8")
     before, _, rest = page.partition(MARKS[0])
     _, _, after = rest.partition(MARKS[1])
-    shown = markdown(rows[name] for name in sorted(rows))
-    PAGE.write_text(f"{before}{MARKS[0]}{shown}{MARKS[1]}{after}", encoding="utf-8")
+    PAGE.write_text(f"{before}{MARKS[0]}{markdown(rows)}{MARKS[1]}{after}", encoding="utf-8")
 
 
 def markdown(rows: Iterable[dict[str, str]]) -> str:
@@ -215,7 +231,7 @@ def main(
     """Try clients and write their rows; return the exit status.
 
     Args:
-        clients: to try whether or not they have a row; none: all that have none.
+        clients: to try whether or not they have rows; none: all that have none.
         show: only print the table that there is.
         keep: keep the environments, hundreds of megabytes each, for the next time.
     """
@@ -224,20 +240,22 @@ def main(
         print(f"error: found {', '.join(unknown)}; there are {', '.join(names())}", file=sys.stderr)
         return 2
     failed = []
-    todo = [] if show else list(clients) or [name for name in names() if name not in rows]
+    there = {row["client"] for row in rows}
+    todo = [] if show else list(clients) or [name for name in names() if name not in there]
     if todo:
         install_roller()
     for client in todo:
         print(f"{client} ...", flush=True)
         try:
-            rows[client] = try_client(client)
+            others = [row for row in rows if row["client"] != client]
+            rows = sorted(others + try_client(client), key=lambda row: row["client"])
             write_rows(rows)
         except ClientError as error:
             failed.append(client)
             print(error, file=sys.stderr)
         if not keep:
             shutil.rmtree(PLACE / client, ignore_errors=True)
-    print(markdown(rows[name] for name in sorted(rows)), end="")
+    print(markdown(rows), end="")
     for client in failed:
         print(f"{client}: FAILED, see above")
     return 1 if failed else 0
