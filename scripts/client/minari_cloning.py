@@ -1,7 +1,7 @@
 """Minari: collect, recover the environment, replay, and learn from what was collected.
 
 The data set holds games of the player that comes with Roller, wrong keys now and then among them. A
-network that does as it did is judged in the recovered environment, after one that was taught nothing.
+network that does as it did is judged in the recovered environment, after one that was not taught.
 """
 
 from __future__ import annotations
