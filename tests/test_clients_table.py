@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts import clients
+from scripts import clients, matrix
 
 
 def test_every_client_has_a_script_and_pins_the_library_it_is_about() -> None:
@@ -46,7 +46,7 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> list[list[float]]:
         told = [json.dumps({"used": "a collector", "returns": one}) for one in returns]
         return "\n".join(["a warning", *told, "another"])
 
-    monkeypatch.setattr(clients.matrix, "run", run)
+    monkeypatch.setattr(matrix, "run", run)
     monkeypatch.setattr(clients, "set_up", lambda _: Path("python"))
     return returns
 
