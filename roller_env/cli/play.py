@@ -1,11 +1,11 @@
-"""Play the game in a browser page, in a window, or watch a trained agent play.
+"""Play the game in a browser page, or watch a trained agent play.
 
 Examples::
 
     roller play
     roller play bridge --skip-intro
     roller play --policy runs/ppo_classic-seed0
-    roller play my_level.yaml --physics accurate --viewer native
+    roller play my_level.yaml --physics accurate
 """
 
 from __future__ import annotations
@@ -15,29 +15,23 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import tyro
 
 from roller_env.config import EnvConfig
 from roller_env.platforms import ENDING_SIGNALS
-from roller_env.play.app import GamePlugin, ScreenPlugin, level_choices
-from roller_env.play.scene import Quality
-from roller_env.play.server import (
-    DEFAULT_PORT,
-    LOOPBACK,
-    NATIVE_NOTE,
-    check_address,
-    open_page,
-    open_window,
-    run,
-    warning_of,
-)
-from roller_env.play.session import GameSession, Player, play_config
-from roller_env.play.sound import CoinSound
+from roller_env.play.offers import offers_of
+from roller_env.play.records import Records, default_file
+from roller_env.play.room import Room
+from roller_env.play.server import DEFAULT_PORT, LOOPBACK, listen, serve, warning_of
+from roller_env.play.session import GameSession, Observer, play_config
 from roller_env.problems import printable
 from roller_env.replay import datasets
 from roller_env.replay.keeper import ReplayKeeper
+
+if TYPE_CHECKING:
+    from roller_env.play.autopilot import Autopilot
 
 RECORDED: Final = Path("replays")
 """Where games are kept that are to become data sets, if nothing else is asked for."""
@@ -59,10 +53,7 @@ class Arguments:
     host: str = LOOPBACK
     """Address to listen on. By default only this machine reaches the page."""
 
-    viewer: Literal["web", "native"] = "web"
-    """A page in the browser, or a window (Python 3.12 or newer)."""
-
-    quality: Quality = "high"
+    quality: Literal["high", "low"] = "high"
     """low is for machines that draw without a graphics processor."""
 
     physics: str | None = None
@@ -88,8 +79,8 @@ class Arguments:
     """Prefix of Minari data sets of what was played, one a level, such as roller/human. Every game
     is kept as a replay too, without --replays in the directory replays."""
 
-    mute: bool = False
-    """No sound."""
+    records: Path | None = None
+    """File of best times, coins and medals; by default one of yours, where programs keep data."""
 
 
 def main(argv: Sequence[str] | None = None, prog: str | None = None) -> int:
@@ -116,31 +107,31 @@ def play(arguments: Arguments) -> int:
         datasets.check_prefix(arguments.record)
         # The data sets are written at the end, and what is killed before has none.
         directory = directory or RECORDED
-    if arguments.viewer == "web":
-        check_address(arguments.host, arguments.port)
+    listening = listen(arguments.host, arguments.port)
     # When its terminal is closed, the game still writes what was recorded.
     for number in ENDING_SIGNALS:
         signal.signal(number, signal.default_int_handler)
     config, agent = game_of(arguments)
     keeper = ReplayKeeper(directory, "human" if agent is None else "agent and human")
-    choices = level_choices(config.level)
-    sound = CoinSound(muted=arguments.mute)
-    if sound.silent_because and not arguments.mute:
-        print(f"no sound: {sound.silent_because}")
-    sessions = session_maker(config, agent, arguments, keeper)
-    game = GamePlugin(sessions, choices, sound, arguments.quality)
-    plugins = (game, ScreenPlugin(choices))
-    if arguments.viewer == "native":
-        handle = open_window(plugins)
-        print(NATIVE_NOTE)
-    else:
-        if warning := warning_of(arguments.host):
-            print(warning, file=sys.stderr)
-        handle = open_page(plugins, port=arguments.port, host=arguments.host)
+    records = Records(arguments.records or default_file())
+    room = Room(
+        game_opener(config, agent, arguments),
+        offers_of(config.level),
+        str(config.level),
+        keeper=keeper,
+        records=records,
+        agent=agent,
+        agent_name=arguments.policy.name if arguments.policy else "",
+        quality=arguments.quality,
+        skip_intro=arguments.skip_intro,
+    )
+    if warning := warning_of(arguments.host):
+        print(warning, file=sys.stderr)
     try:
-        run(handle)
+        serve(room, listening, arguments.host)
     finally:
         status = write_record(keeper, arguments.record)
+        records.close()
     return status
 
 
@@ -165,7 +156,7 @@ def write_record(keeper: ReplayKeeper, record: str | None) -> int:
     return 1 if problems else 0
 
 
-def game_of(arguments: Arguments) -> tuple[EnvConfig, Player | None]:
+def game_of(arguments: Arguments) -> tuple[EnvConfig, Autopilot | None]:
     """Return the options of the game, and the agent that plays it, if one does."""
     if arguments.policy is None:
         physics = arguments.physics or "default"
@@ -178,18 +169,18 @@ def game_of(arguments: Arguments) -> tuple[EnvConfig, Player | None]:
     )
 
 
-def session_maker(
-    config: EnvConfig, agent: Player | None, arguments: Arguments, keeper: ReplayKeeper
-) -> Callable[[str], GameSession]:
+def game_opener(
+    config: EnvConfig, agent: Autopilot | None, arguments: Arguments
+) -> Callable[[str, Sequence[Observer]], GameSession]:
     """Return what makes the game of a level."""
 
-    def make(level: str) -> GameSession:
+    def open_game(level: str, observers: Sequence[Observer]) -> GameSession:
         return GameSession(
             replace(config, level=level),
             skip_intro=arguments.skip_intro,
             seed=arguments.seed,
             agent=agent,
-            observers=(keeper,),
+            observers=observers,
         )
 
-    return make
+    return open_game

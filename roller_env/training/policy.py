@@ -20,6 +20,7 @@ from typing import Annotated, Any, Final, Literal, Protocol
 import numpy as np
 import numpy.typing as npt
 import safetensors.torch
+import torch
 from gymnasium import Space, spaces
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from safetensors import SafetensorError
@@ -89,6 +90,24 @@ class TrainedPolicy:
         seen = observations if self.normalisation is None else self.normalisation(observations)
         actions, _ = self.network.predict(seen, deterministic=True)
         return actions
+
+    def judge(self, observations: Observations, /) -> tuple[Float64 | None, Float64]:
+        """Return what the agent thinks of its choice, and of where it is.
+
+        Args:
+            observations: as the environment gives them, leading axis of n environments.
+
+        Returns:
+            The actions' probabilities, (n, actions), None where they are not of a finite number;
+            and the discounted reward that it expects, (n,), in the units of its training.
+        """
+        seen = observations if self.normalisation is None else self.normalisation(observations)
+        with torch.no_grad():
+            tensors, _ = self.network.obs_to_tensor(seen)
+            chosen: Any = self.network.get_distribution(tensors).distribution
+            value = self.network.predict_values(tensors)[:, 0]
+        among = isinstance(chosen, torch.distributions.Categorical)
+        return chosen.probs.double().numpy() if among else None, value.double().numpy()
 
 
 class _Strict(BaseModel):

@@ -65,7 +65,7 @@ def main() -> None:
             flat = data.reshape(-1)
             for rows in torch.randperm(BATCH).chunk(4):
                 losses = loss(flat[rows])
-                total = sum(losses[name] for name in losses if name.startswith("loss_"))
+                total = sum(one for name, one in losses.items() if name.startswith("loss_"))
                 optimizer.zero_grad()
                 total.backward()
                 nn.utils.clip_grad_norm_(loss.parameters(), 0.5)
