@@ -11,12 +11,11 @@ from pathlib import Path
 
 CONFIGURATION = Path(__file__).with_suffix(".yml")
 ID = "Roller/Flat-v0"
+PACKAGES = ("--gym-packages", "roller_env")
 OPTIONS = ("reward:'shaped'", "physics:'rigid'", "control_dt_s:0.1", "max_episode_steps:150")
 
 
 def zoo(command: str, *arguments: str) -> None:
-    # It imports a module of this name, if there is one, before it looks for environments.
-    Path("custom_envs.py").write_text("import roller_env\n", encoding="utf-8")
     subprocess.run(
         [sys.executable, "-m", f"rl_zoo3.{command}", "--algo", "ppo", "--env", ID, *arguments],
         env=os.environ | {"PYTHONPATH": str(Path.cwd())},
@@ -27,10 +26,13 @@ def zoo(command: str, *arguments: str) -> None:
 def main() -> None:
     zoo(
         "train",
+        *PACKAGES,
         *("--conf-file", str(CONFIGURATION), "--env-kwargs", *OPTIONS),
         *("--eval-freq", "-1", "--seed", "0", "--log-folder", "logs", "--verbose", "0"),
     )
-    zoo("enjoy", "--folder", "logs", "--n-timesteps", "200", "--no-render")
+    zoo("enjoy", *PACKAGES, "--folder", "logs", "--n-timesteps", "200", "--no-render")
+    # It has no such option, but imports a module of this name, if there is one.
+    Path("custom_envs.py").write_text("import roller_env\n", encoding="utf-8")
     zoo("record_video", "--folder", "logs", "--n-timesteps", "40", "--output-folder", "films")
     (film,) = Path("films").glob("*.mp4")
     if film.stat().st_size < 1000:
