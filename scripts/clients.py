@@ -82,7 +82,7 @@ def constraints(client: str) -> str:
 
 
 def install_roller() -> None:
-    """Unpack the wheel where all clients find it, with what Numba has compiled of the same code.
+    """Unpack the wheel where all clients find it, so that Numba compiles the rules once.
 
     Its entry of the index is with it: pip takes roller-env for installed, and looks after its
     dependencies and the client's together.
@@ -96,14 +96,6 @@ def install_roller() -> None:
         shutil.rmtree(ROLLER, ignore_errors=True)
         pip = (sys.executable, "-m", "pip", "install", "--quiet", "--no-deps")
         matrix.run(*pip, "--target", ROLLER, wheel, directory=PLACE)
-        for file in (ROLLER / "roller_env").rglob("*.py"):
-            source = ROOT / file.relative_to(ROLLER)
-            # Numba goes by a file's time and size, and calls what it keeps after module and line.
-            shutil.copystat(source, file)
-            for compiled in (source.parent / "__pycache__").glob(f"{file.stem}.*.nb[ic]"):
-                cache = file.parent / "__pycache__"
-                cache.mkdir(exist_ok=True)
-                shutil.copy(compiled, cache)
         shutil.copyfile(wheel, kept)
 
 
