@@ -129,7 +129,7 @@ def print_results(run: TrainingRun) -> None:
     """Say where everything is."""
     if run.was_finished:
         print(f"{shown(run.files.directory)} is finished already; remove it to train it anew.")
-        print(run.files.evaluation_table.read_text())
+        print(run.files.evaluation_table.read_text(encoding="utf-8"))
     files = run.files
     results = {
         "policy": files.policy,
