@@ -3,7 +3,7 @@
 import type { Frame, FromServer, Outcome, Phase, Quat, ToServer, Vec3 } from "./types";
 
 const FORMAT = 1;
-const HEADER_BYTES = 96;
+const HEADER_BYTES = 98;
 
 const PHASES: readonly Phase[] = ["start", "intro", "playing", "paused", "ended"];
 const OUTCOMES: readonly Outcome[] = ["none", "finish", "fall", "diverged", "time limit"];
@@ -36,8 +36,8 @@ export function decodeFrame(data: ArrayBuffer | ArrayBufferView, coinsInLevel: n
   const flags = view.getUint8(2);
   const numbers = (offset: number, count: number) =>
     Array.from({ length: count }, (_, i) => view.getFloat32(offset + 4 * i, true));
-  const movers = view.getUint8(94);
-  const machines = view.getUint8(95);
+  const movers = view.getUint16(94, true);
+  const machines = view.getUint16(96, true);
   const phasesAt = HEADER_BYTES + 4 * movers;
   const takenAt = phasesAt + machines;
   const crowdAt = takenAt + Math.ceil(coinsInLevel / 8);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from roller_env.arrays import Float64
+from roller_env.game.step import INTRO_S
 from roller_env.replay import Replay, load_replay, shipped_replays
 from roller_env.replay.contents import level_hash
 from roller_env.replay.playback import paths
@@ -15,11 +16,12 @@ class Ghost:
         """Play the replay once."""
         self._centres = paths([replay])[0]
         self._step_s = replay.options.control_dt_s
+        self._intro_s = INTRO_S if replay.intro else 0.0
 
     def at(self, time_s: float) -> Float64:
-        """Return the ball's centre, (3,) metres, a time after the start; at last where it ended."""
+        """Return the ball's centre, (3,) metres, after the keys worked; then where it ended."""
         last = len(self._centres) - 1
-        moment = min(max(time_s / self._step_s, 0.0), float(last))
+        moment = min(max((time_s + self._intro_s) / self._step_s, 0.0), float(last))
         before = int(moment)
         after = min(before + 1, last)
         share = moment - before

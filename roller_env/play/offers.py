@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
 from roller_env.assets import LEVELS, asset_directory
 from roller_env.config import LevelSource
 from roller_env.level import load_level
 from roller_env.play.room import Offer
+
+OWN: Final = "own"
+"""Name of the offer of a level that does not come with Roller, wherever its file may be."""
 
 
 def offers_of(level: LevelSource) -> list[Offer]:
@@ -18,7 +22,7 @@ def offers_of(level: LevelSource) -> list[Offer]:
     """
     offers = [shipped_offer(name) for name in LEVELS]
     if level not in LEVELS:
-        offers.insert(0, Offer(str(level), load_level(level)))
+        offers.insert(0, Offer(OWN, load_level(level)))
     return offers
 
 

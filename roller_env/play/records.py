@@ -9,9 +9,11 @@ from __future__ import annotations
 import os
 import sqlite3
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from roller_env.game.result import EpisodeResult, Medal
 from roller_env.game.version import RULES_VERSION
@@ -37,8 +39,12 @@ create table if not exists records (
     best_coins integer not null default 0,
     replay blob,
     primary key (level, physics)
-) strict
+)
 """
+
+_COLUMNS: Final = "attempts, finishes, medal, best_time_s, best_coins, replay"
+_WAIT_S: Final = 0.2
+"""How long another process that writes is waited for, at most: a game goes on meanwhile."""
 
 
 class RecordsError(RuntimeError):
@@ -94,43 +100,49 @@ class Records:
         Raises:
             RecordsError: it cannot be opened, or is something else.
         """
+        self._file = file
         try:
             if file is not None:
                 file.parent.mkdir(parents=True, exist_ok=True)
-            # No transaction but that of each statement.
             self._database = sqlite3.connect(
-                ":memory:" if file is None else file, isolation_level=None, check_same_thread=False
+                ":memory:" if file is None else file,
+                timeout=_WAIT_S,
+                isolation_level=None,
+                check_same_thread=False,
             )
             self._database.execute(_TABLES)
+            self._database.execute(f"select {_COLUMNS} from records where level = ''")
+            # What cannot be written is told now, and not when there is something to be kept.
+            self._database.execute("begin immediate")
+            self._database.execute("rollback")
         except (OSError, sqlite3.Error) as error:
-            what = error.strerror if isinstance(error, OSError) else str(error)
-            raise RecordsError(
-                f"{shown(file)}: {what}; records cannot be kept there, --records names another file"
-            ) from None
+            raise self._unusable(error) from None
 
     def of(self, level: Level, preset: PhysicsPreset) -> Record:
-        """Return what has been reached in a level."""
-        row = self._database.execute(
-            "select attempts, finishes, medal, best_time_s, best_coins from records "
-            "where level = ? and physics = ?",
-            _key(level, preset),
-        ).fetchone()
+        """Return what has been reached in a level.
+
+        Raises:
+            RecordsError: the file cannot be read any more.
+        """
+        row = self._row(level, preset)
         if row is None:
             return Record()
-        attempts, finishes, medal, best_time_s, best_coins = row
+        attempts, finishes, medal, best_time_s, best_coins, _ = row
         return Record(
             attempts, finishes, _MEDALS[medal - 1] if medal else None, best_time_s, best_coins
         )
 
     def best_run(self, level: Level, preset: PhysicsPreset) -> Replay | None:
-        """Return the fastest game that finished, None if there is none that can be read."""
-        row = self._database.execute(
-            "select replay from records where level = ? and physics = ?", _key(level, preset)
-        ).fetchone()
-        if row is None or row[0] is None:
+        """Return the fastest game that finished, None if there is none that can be read.
+
+        Raises:
+            RecordsError: the file cannot be read any more.
+        """
+        row = self._row(level, preset)
+        if row is None or row[-1] is None:
             return None
         try:
-            return decode(row[0])
+            return decode(row[-1])
         except ReplayError:
             return None
 
@@ -144,7 +156,16 @@ class Records:
             preset: of the physics.
             result: how it ended.
             replay: of it, kept if it is the fastest.
+
+        Raises:
+            RecordsError: the file cannot be written any more.
         """
+        with self._transaction():
+            return self._add(level, preset, result, replay)
+
+    def _add(
+        self, level: Level, preset: PhysicsPreset, result: EpisodeResult, replay: Replay | None
+    ) -> Improved:
         before = self.of(level, preset)
         medal = result.medal(level.par_time_s)
         finished = result.success
@@ -173,6 +194,37 @@ class Records:
     def close(self) -> None:
         """Close the file."""
         self._database.close()
+
+    def _row(self, level: Level, preset: PhysicsPreset) -> tuple[Any, ...] | None:
+        try:
+            row: tuple[Any, ...] | None = self._database.execute(
+                f"select {_COLUMNS} from records where level = ? and physics = ?",
+                _key(level, preset),
+            ).fetchone()
+        except sqlite3.Error as error:
+            raise self._unusable(error) from None
+        return row
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        """Let nobody else write from what is read until what is written."""
+        try:
+            self._database.execute("begin immediate")
+            try:
+                yield
+                self._database.execute("commit")
+            except BaseException:
+                self._database.execute("rollback")
+                raise
+        except sqlite3.Error as error:
+            raise self._unusable(error) from None
+
+    def _unusable(self, error: Exception) -> RecordsError:
+        what = error.strerror if isinstance(error, OSError) else str(error)
+        return RecordsError(
+            f"{shown(self._file)}: {what}; records cannot be kept there, "
+            "--records names another file"
+        )
 
 
 def _rank(medal: Medal | None) -> int:

@@ -142,6 +142,8 @@ class ReplaySession:
             result=simulation.result(),
             coins_in_level=int(simulation.coins_in_level[0]),
             control_in_s=float(simulation.state.control_delay_s[0]),
+            # On record it is a part of the episode.
+            intro_s=0.0,
             falls=0,
             agent=False,
             agent_plays=False,

@@ -7,10 +7,11 @@ guest: a frame that one cannot take in time is left out for it.
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal, Protocol
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Final, Literal, Protocol, TypeVar
 
 from roller_env.arrays import Float64
 from roller_env.game.actions import KEYS
@@ -19,7 +20,7 @@ from roller_env.game.state import COIN_ON_PANELS
 from roller_env.level import Level
 from roller_env.level.expand import expand
 from roller_env.play.ghost import Ghost, par_run
-from roller_env.play.records import Improved, Records
+from roller_env.play.records import Improved, Records, RecordsError
 from roller_env.play.replay_session import ReplaySession
 from roller_env.play.scene import Scene
 from roller_env.play.session import GameSession, Observer, Phase
@@ -35,6 +36,7 @@ from roller_env.play.wire import (
     frame_bytes,
     message,
 )
+from roller_env.replay import Replay
 from roller_env.replay.contents import level_hash
 from roller_env.replay.keeper import ReplayKeeper
 from roller_env.simulation import Simulation, Transition
@@ -52,12 +54,16 @@ nothing does."""
 KEYS_GO_STALE_S: Final = 0.75
 """Keys of which nothing was heard for so long are let go: a page tells them four times a second."""
 
+MAX_WISHES: Final = 64
+"""What a player may ask for and not have got yet; what is beyond is not heard."""
+
 AGENT_S: Final = 0.1
 """Time from one message about what an agent thinks to the next."""
 
 Mode = Literal["play", "replay", "watch"]
 Game = GameSession | ReplaySession
 Message = dict[str, Any]
+Answer = TypeVar("Answer")
 
 
 class Guest(Protocol):
@@ -141,12 +147,13 @@ class Room:
         self._held, self._tapped, self._told_s = "", "", 0.0
         self._ghost: Ghost | None = None
         self._ghost_kind: GhostKind = "none"
-        self._ended: list[tuple[EpisodeResult, bool]] = []
+        self._ended: list[tuple[EpisodeResult, bool, Replay | None]] = []
         self._agent_told_s = 0.0
         self._problems: Message | None = None
         self._result: Message | None = None
         self._timeline_told: Message | None = None
         self._wishes: list[ToServer] = []
+        self._changed = False
         self._woken = asyncio.Event()
 
     # Who is there ----------------------------------------------------------------------------
@@ -166,6 +173,8 @@ class Room:
 
     def leave(self, guest: Guest) -> None:
         """Somebody goes; if it was the player, the game waits for the next one."""
+        if guest not in self._guests:
+            return
         self._guests.remove(guest)
         if guest in self._asking:
             self._asking.remove(guest)
@@ -179,7 +188,7 @@ class Room:
         if self._player is before:
             return
         self._held = self._tapped = ""
-        self._wishes = [wish for wish in self._wishes if isinstance(wish, Choose)]
+        self._wishes.clear()
         if self._game is not None and self._mode != "replay":
             self._game.pause()
         for guest, seat in ((before, "spectator"), (self._player, "player")):
@@ -205,7 +214,10 @@ class Room:
         elif isinstance(wish, Keys):
             self._held, self._told_s = wish.held, time.monotonic()
             self._tapped = "".join(key for key in KEYS if key in self._tapped + wish.held)
-        else:
+        elif len(self._wishes) < MAX_WISHES:
+            if _loads(wish):
+                # Of several levels that are asked for, the last one is meant.
+                self._wishes = [other for other in self._wishes if not _loads(other)]
             self._wishes.append(wish)
             self._woken.set()
 
@@ -219,7 +231,7 @@ class Room:
         """Put another level in the place of the offer of that name, and load it if it is played."""
         self.offers[offer.name] = offer
         if offer.name == self._name:
-            self._wishes.append(Choose(type="choose", level=offer.name))
+            self._changed = True
             self._woken.set()
 
     # What time does --------------------------------------------------------------------------
@@ -229,7 +241,9 @@ class Room:
         await self._load(self._name)
         before = due = time.monotonic()
         while True:
-            due = max(due + self._interval_s(), time.monotonic())
+            # Whatever wakes the room: the next frame is due an interval from now at the latest.
+            now, interval_s = time.monotonic(), self._interval_s()
+            due = min(max(due + interval_s, now), now + interval_s)
             await self._sleep_until(due)
             now = time.monotonic()
             await self._answer()
@@ -245,6 +259,8 @@ class Room:
     async def _sleep_until(self, due_s: float) -> None:
         """Sleep, but not longer than until somebody comes or asks for something."""
         self._woken.clear()
+        if self._wishes or self._changed:
+            return
         rest = due_s - time.monotonic() if self._guests else None
         try:
             async with asyncio.timeout(None if rest is None else max(rest, 0.0)):
@@ -268,13 +284,11 @@ class Room:
         game, now = self._played, time.monotonic()
         if now - self._told_s > KEYS_GO_STALE_S:
             self._held = self._tapped = ""
-        was = game.phase
         # A key that went down and up since the last look has been held.
         if game.advance(elapsed_s, self._tapped or self._held):
             self._tapped = ""
         self._count_ends()
-        if self._mode == "replay" or (game.phase is Phase.PAUSED and was is not Phase.PAUSED):
-            self._tell_timeline()
+        self._tell_timeline()
         if self._agent is not None and game.is_moving and now >= self._agent_told_s + AGENT_S:
             self._agent_told_s = now
             self._tell(self._agent_message())
@@ -285,7 +299,7 @@ class Room:
         frame = self._played.frame()
         ghost = None
         if self._ghost is not None and frame.phase in (Phase.PLAYING, Phase.PAUSED, Phase.ENDED):
-            ghost = self._ghost.at(frame.result.time_s)
+            ghost = self._ghost.at(frame.result.time_s - frame.intro_s)
         crowd = None if self._crowd is None else self._crowd.centres(frame.fraction)
         shown = frame_bytes(frame, self.scene, ghost, crowd, self.keeper.directory is not None)
         for guest in self._guests:
@@ -293,9 +307,11 @@ class Room:
 
     async def _answer(self) -> None:
         """Do what the player asked for."""
-        wishes, self._wishes = self._wishes, []
-        for wish in wishes:
-            await self._do(wish)
+        if self._changed:
+            self._changed = False
+            await self._load(self._name)
+        while self._wishes:
+            await self._do(self._wishes.pop(0))
 
     async def _do(self, wish: ToServer) -> None:
         game = self._played
@@ -323,8 +339,6 @@ class Room:
                 "step": lambda: game.step_once(self._held),
             }
             deeds[wish.type]()
-        if game.phase is Phase.PAUSED:
-            self._tell_timeline()
 
     async def _load(self, name: str, begin: bool = False) -> None:
         """Load a level, while pages are still served."""
@@ -344,8 +358,9 @@ class Room:
             return game, scene
 
         self._game, self.scene = await asyncio.to_thread(load)
-        if begin:
+        if begin and self._player is not None:
             self._played.start()
+        self._timeline_told = self._result = None
         self._tell(self._level_message())
         self._tell(message("levels", levels=self._levels()))
         await self._race(self._ghost_kind)
@@ -355,14 +370,21 @@ class Room:
         self._ghost_kind = kind
         game = self._played
 
-        def run() -> Ghost | None:
-            if kind == "best":
-                replay = self._records.best_run(game.level, game.preset)
-            else:
-                replay = par_run(self._name, level_hash(game.level))
-            return None if replay is None else Ghost(replay)
+        replay = None
+        if kind == "best":
+            replay = self._of_records(lambda records: records.best_run(game.level, game.preset))
+        elif kind == "par":
+            replay = par_run(self._name, level_hash(game.level))
+        self._ghost = None if replay is None else await asyncio.to_thread(Ghost, replay)
 
-        self._ghost = None if kind == "none" else await asyncio.to_thread(run)
+    def _of_records(self, ask: Callable[[Records], Answer]) -> Answer:
+        """Return what the records say; if their file fails, go on with ones in memory."""
+        try:
+            return ask(self._records)
+        except RecordsError as error:
+            self._records = Records()
+            self._tell(message("notice", text=str(error)))
+            return ask(self._records)
 
     # What pages are told ---------------------------------------------------------------------
 
@@ -404,7 +426,8 @@ class Room:
             "attempts": 0,
         }
         if self._game is not None:
-            record = self._records.of(level, self._game.preset)
+            preset = self._game.preset
+            record = self._of_records(lambda records: records.of(level, preset))
             row |= {
                 "medal": record.medal,
                 "best_time_s": record.best_time_s,
@@ -447,13 +470,13 @@ class Room:
         return message(
             "agent",
             actions=list(insight.actions),
-            probabilities=[round(p, 3) for p in insight.probabilities] or None,
-            value=round(insight.value, 3),
+            probabilities=[_number(p) for p in insight.probabilities] or None,
+            value=_number(insight.value),
             entries=[
-                {"name": name, "value": [round(number, 3) for number in numbers]}
+                {"name": name, "value": [_number(number) for number in numbers]}
                 for name, numbers in insight.entries.items()
             ],
-            reward_terms={name: round(value, 3) for name, value in terms.items()},
+            reward_terms={name: _number(value) for name, value in terms.items()},
         )
 
     # What has ended --------------------------------------------------------------------------
@@ -469,24 +492,31 @@ class Room:
 
     def on_end(self, simulation: Simulation, result: EpisodeResult) -> None:
         """Remember how a game ended, until the room comes to it."""
-        practice = isinstance(self._game, GameSession) and self._game.practice
-        if bool(simulation.state.control_delay_s[0] <= 0.0) and simulation.state.steps[0] > 0:
-            self._ended.append((result, practice))
+        game = self._game
+        assert isinstance(game, GameSession)
+        played_s = result.time_s - game.intro_s
+        if played_s > 0.0:
+            # The intro is no time of a player's.
+            result = replace(result, time_s=played_s)
+            self._ended.append((result, game.practice, self.keeper.latest))
 
     def _count_ends(self) -> None:
         """Enter games that have ended into the records, and tell pages of them."""
         ended, self._ended = self._ended, []
-        for result, practice in ended:
-            self._count(result, counts=not practice and self._agent is None)
+        for result, practice, replay in ended:
+            self._count(result, replay, counts=not practice and self._agent is None)
         if ended:
             self._tell(message("levels", levels=self._levels()))
 
-    def _count(self, result: EpisodeResult, counts: bool) -> None:
+    def _count(self, result: EpisodeResult, replay: Replay | None, counts: bool) -> None:
         game = self._played
         improved = Improved(False, False)
         if counts:
-            replay = self.keeper.replays[-1] if self.keeper.replays else None
-            improved = self._records.add(game.level, game.preset, result, replay)
+            improved = self._of_records(
+                lambda records: records.add(game.level, game.preset, result, replay)
+            )
+            if improved.time and self._ghost_kind == "best":
+                self._wishes.append(GhostChoice(type="ghost", kind="best"))
         if result.outcome == "not ended":
             return
         whole = result.success and result.score_percent == 100.0
@@ -511,3 +541,12 @@ class Room:
         names = list(self.offers)
         number = names.index(self._name) + 1
         return names[number] if number < len(names) else None
+
+
+def _loads(wish: ToServer) -> bool:
+    return isinstance(wish, Choose) or wish.type in ("next", "menu")
+
+
+def _number(value: float) -> float | None:
+    """Return a number as pages are told it: what is not finite is nothing."""
+    return round(value, 3) if math.isfinite(value) else None

@@ -29,7 +29,6 @@ from roller_env.pieces.coin import coin_shapes
 from roller_env.pieces.look import METAL, Paint, Shape
 from roller_env.pieces.piece import Mover, Piece, Solid, number_of
 from roller_env.pieces.surfaces import Surface, solid_surfaces
-from roller_env.replay.contents import canonical_text
 
 FORMAT: Final = 1
 
@@ -67,7 +66,6 @@ class Scene:
 
     Attributes:
         level: the level.
-        hash: of all that the scene is made of; scenes with the same one are the same.
         machines: the pieces of which frames tell the phase.
         coins: how many there are.
         slots: of each of the level's movers, which slab of the simulation's it is.
@@ -77,7 +75,6 @@ class Scene:
         """Find what is to be seen of ``level``."""
         everything = expand(level)
         self.level = level
-        self.hash = hashlib.sha256(f"{FORMAT} {canonical_text(level)}".encode()).hexdigest()[:16]
         self.coins = len(everything.coins)
         self.slots = LevelTable.of_levels([level]).slots([level])[0]
         self.machines: list[Machine] = []
@@ -103,8 +100,13 @@ class Scene:
     @cached_property
     def content(self) -> bytes:
         """The scene as JSON, compressed by gzip: always the same bytes for the same level."""
-        text = json.dumps(self._data(), separators=(",", ":"), allow_nan=False)
-        return gzip.compress(text.encode(), mtime=0)
+        data = {**self._data(), "hash": self.hash}
+        return gzip.compress(_json(data).encode(), mtime=0)
+
+    @cached_property
+    def hash(self) -> str:
+        """Of all that the scene is made of: scenes with the same one are the same."""
+        return hashlib.sha256(_json(self._data()).encode()).hexdigest()[:16]
 
     def _machine(self, piece: Piece, number: int, mover: Mover | None) -> Machine:
         if mover is None:
@@ -126,7 +128,6 @@ class Scene:
             "name": level.name,
             "title": level.title or level.name,
             "description": level.description,
-            "hash": self.hash,
             "par_time_s": level.par_time_s,
             "coins": self.coins,
             "ball_radius": level.ball.radius,
@@ -239,6 +240,10 @@ class _Surfaces:
                 }
             )
         return self._known[id(surface)][0]
+
+
+def _json(data: dict[str, Any]) -> str:
+    return json.dumps(data, separators=(",", ":"), allow_nan=False)
 
 
 def _base64(array: npt.NDArray[Any], dtype: str) -> str:

@@ -10,8 +10,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
-import itertools
+import ipaddress
 import json
+import os
 import re
 import signal
 import socket
@@ -22,13 +23,14 @@ from urllib.parse import urlsplit
 
 import uvicorn
 from starlette.applications import Starlette
+from starlette.datastructures import Headers
 from starlette.middleware import Middleware
 from starlette.middleware.gzip import GZipMiddleware
-from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from roller_env.assets import asset_directory
@@ -45,7 +47,6 @@ MAX_GUESTS: Final = 16
 MAX_WAITING: Final = 256
 """Messages that may wait for one browser: one that takes none for so long is sent away."""
 
-_LOCAL_HOSTS: Final = ("localhost", "127.0.0.1", "[::1]")
 _LOCAL_ORIGIN: Final = re.compile(r"http://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
 """Of pages that this machine served: a tunnel's other end may have another port."""
 
@@ -75,12 +76,12 @@ def listen(host: str, port: int) -> socket.socket:
     """
     if not 0 <= port <= MAX_PORT:
         raise PlayError(f"port: found {port}; must be a whole number from 0 to {MAX_PORT}")
-    candidates = [port] if port else itertools.chain(range(DEFAULT_PORT, DEFAULT_PORT + 100), [0])
+    candidates = [port] if port else [*range(DEFAULT_PORT, DEFAULT_PORT + 100), 0]
     for candidate in candidates:
         try:
             return _bound(host, candidate)
         except OSError as error:
-            if port == 0 and error.errno == errno.EADDRINUSE:
+            if port == 0 and error.errno in (errno.EADDRINUSE, errno.EACCES):
                 continue
             where, hint = f"host {host!r}", "--host says where to listen"
             if error.errno in (errno.EADDRINUSE, errno.EACCES):
@@ -92,8 +93,9 @@ def listen(host: str, port: int) -> socket.socket:
 def _bound(host: str, port: int) -> socket.socket:
     found = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
     try:
-        # So that a port is free that somebody has just left.
-        found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if os.name != "nt":
+            # So that a port is free that somebody has just left; on Windows it could be shared.
+            found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         found.bind((host, port))
         found.listen(64)
     except OSError:
@@ -104,7 +106,7 @@ def _bound(host: str, port: int) -> socket.socket:
 
 def warning_of(host: str) -> str | None:
     """Return what listening on ``host`` means, if it is more than this machine."""
-    if host == LOOPBACK:
+    if is_loopback(host):
         return None
     return (
         f"warning: listening on {host}. There is no password and no encryption: everybody who can "
@@ -112,6 +114,14 @@ def warning_of(host: str) -> str | None:
         f"Without --host only this machine can ('ssh -L {DEFAULT_PORT}:localhost:{DEFAULT_PORT}' "
         "reaches it from another)."
     )
+
+
+def is_loopback(host: str) -> bool:
+    """Say whether an address to listen on is reached by this machine only."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 class Browser:
@@ -194,8 +204,8 @@ def make_app(room: Room, host: str = LOOPBACK) -> Starlette:
             return
         browser = Browser(socket)
         guests.add(browser)
-        room.enter(browser)
         try:
+            room.enter(browser)
             await _first_of(browser.send(), browser.receive(room))
         finally:
             guests.discard(browser)
@@ -204,9 +214,7 @@ def make_app(room: Room, host: str = LOOPBACK) -> Starlette:
     def files(kind: Any) -> StaticFiles:
         return StaticFiles(directory=asset_directory(kind))
 
-    middleware = [Middleware(GZipMiddleware)]
-    if host == LOOPBACK:
-        middleware.append(Middleware(TrustedHostMiddleware, allowed_hosts=list(_LOCAL_HOSTS)))
+    middleware = [Middleware(GZipMiddleware), Middleware(_KnownNames, host=host)]
     return Starlette(
         routes=[
             Route("/", index),
@@ -220,6 +228,36 @@ def make_app(room: Room, host: str = LOOPBACK) -> Starlette:
     )
 
 
+class _KnownNames:
+    """Answers to this machine's names and addresses only.
+
+    Any other name may be one that somebody else's page has had made to mean this machine, and then
+    its requests would be of the same origin (DNS rebinding).
+    """
+
+    def __init__(self, app: ASGIApp, host: str) -> None:
+        self._app = app
+        self._names = {"localhost"}
+        self._any_address = not is_loopback(host)
+        if self._any_address:
+            self._names |= {host.lower(), socket.gethostname().lower(), socket.getfqdn().lower()}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on what is asked of this machine."""
+        if scope["type"] in ("http", "websocket") and not self._knows(Headers(scope=scope)):
+            await Response("this machine is not called so", 400)(scope, receive, send)
+        else:
+            await self._app(scope, receive, send)
+
+    def _knows(self, headers: Headers) -> bool:
+        name = urlsplit(f"//{headers.get('host', '')}").hostname or ""
+        try:
+            address = ipaddress.ip_address(name)
+        except ValueError:
+            return name in self._names
+        return self._any_address or address.is_loopback
+
+
 def _is_welcome(socket: WebSocket, host: str) -> bool:
     """Say whether a browser's page is one that this machine served.
 
@@ -228,7 +266,7 @@ def _is_welcome(socket: WebSocket, host: str) -> bool:
     origin = socket.headers.get("origin")
     if origin is None:
         return True
-    if host == LOOPBACK:
+    if is_loopback(host):
         return _LOCAL_ORIGIN.fullmatch(origin) is not None
     return urlsplit(origin).netloc == socket.headers.get("host")
 
@@ -291,6 +329,9 @@ async def _serve(
             make_app(room, host),
             log_level="warning",
             ws_max_size=MAX_MESSAGE_BYTES,
+            # A browser that is gone without a word keeps its seat no longer than this.
+            ws_ping_interval=5.0,
+            ws_ping_timeout=5.0,
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=1,
             lifespan="off",
@@ -299,7 +340,7 @@ async def _serve(
     asked = asyncio.Event()
     with _signals(asked.set):
         port = listening.getsockname()[1]
-        shown = "localhost" if host == LOOPBACK else host
+        shown = "localhost" if is_loopback(host) else f"[{host}]" if ":" in host else host
         print(f"The game is at http://{shown}:{port}/ (Ctrl+C ends it)", flush=True)
         serving = asyncio.create_task(server.serve(sockets=[listening]))
         doings = [asyncio.create_task(room.run()), asyncio.create_task(asked.wait())]
@@ -310,11 +351,11 @@ async def _serve(
             for task in done:
                 task.result()
         finally:
-            room.close()
             server.should_exit = True
             for doing in doings:
                 doing.cancel()
             await asyncio.gather(serving, *doings, return_exceptions=True)
+            room.close()
     print("\nGood bye.", flush=True)
 
 

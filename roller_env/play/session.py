@@ -21,6 +21,7 @@ from roller_env.config import EnvConfig, LevelSource
 from roller_env.game.actions import action_of_keys, forces
 from roller_env.game.result import EpisodeResult
 from roller_env.game.state import GameState
+from roller_env.game.step import INTRO_S
 from roller_env.level import Level
 from roller_env.physics.presets import PhysicsPreset, physics_preset
 from roller_env.play.history import History
@@ -94,6 +95,7 @@ class GameFrame:
         result: how the episode stands.
         coins_in_level: as many as can be collected.
         control_in_s: until the keys work.
+        intro_s: how long after the episode began they did: no time of a player's.
         falls: episodes of this session that ended in a fall.
         agent: whether there is an agent.
         agent_plays: whether it plays now.
@@ -114,6 +116,7 @@ class GameFrame:
     result: EpisodeResult
     coins_in_level: int
     control_in_s: float
+    intro_s: float
     falls: int
     agent: bool
     agent_plays: bool
@@ -149,7 +152,9 @@ class GameSession:
         seed: of the episode under way; the simulation's generator was made of it.
         agent_plays: whether the agent, if there is one, has the ball.
         speed: of the game, of the clock's.
-        practice: whether the game went back, or ran slower, in this episode: it is no record.
+        practice: whether the game went back, or ran slower or step by step, in this episode: it is
+            no record.
+        intro_s: how long after the episode's start the keys work.
     """
 
     def __init__(
@@ -183,6 +188,7 @@ class GameSession:
         self._observers = tuple(observers)
         self._skip_intro = skip_intro
         self.speed = 1.0
+        self.intro_s = 0.0
         self._first_seed = _fresh_seed() if seed is None else seed
         self._under_way = False
         step = self.simulation.duration_s
@@ -226,8 +232,9 @@ class GameSession:
 
     @property
     def moments_s(self) -> tuple[float, float]:
-        """The first and the last moment of the episode that can be shown, since its start."""
-        return 0.0, len(self._history) * self.simulation.duration_s
+        """The first and the last moment of the episode that can be shown, since the keys work."""
+        last_s = len(self._history) * self.simulation.duration_s
+        return 0.0, max(last_s - self.intro_s, 0.0)
 
     @property
     def is_moving(self) -> bool:
@@ -256,6 +263,7 @@ class GameSession:
             result=self.result,
             coins_in_level=int(self.simulation.coins_in_level[0]),
             control_in_s=float(state.control_delay_s[0]),
+            intro_s=self.intro_s,
             falls=self.falls,
             agent=self._agent is not None,
             agent_plays=self.agent_plays,
@@ -293,15 +301,16 @@ class GameSession:
             self.phase = self._resumes_to
 
     def seek(self, time_s: float) -> None:
-        """Show another moment of the episode, nearest to ``time_s`` since its start; in a pause."""
+        """Show another moment, nearest to ``time_s`` since the keys work; in a pause."""
         if self.phase is Phase.PAUSED:
-            self._history.seek(round(time_s / self.simulation.duration_s))
+            self._history.seek(round((time_s + self.intro_s) / self.simulation.duration_s))
             self._before = self._after = self.simulation.qpos[0]
 
     def step_once(self, held: str = "") -> None:
         """Make one control step in a pause, from the moment that is shown."""
         if self.phase is Phase.PAUSED:
             self._go_on()
+            self.practice = True
             self._step(held)
 
     def set_speed(self, factor: float) -> None:
@@ -387,6 +396,7 @@ class GameSession:
         generator, _ = seeding.np_random(self.seed)
         self.simulation.seed([generator])
         self.simulation.reset(intro=intro)
+        self.intro_s = INTRO_S if intro else 0.0
         # Nothing to draw between: the ball did not move there, it was put there.
         self._before = self._after = self.simulation.qpos[0]
         self._force_n = np.zeros(2)
@@ -410,6 +420,8 @@ class GameSession:
     def _leave(self) -> None:
         if self._under_way:
             self._under_way = False
+            # Who leaves may have been looking at an earlier moment.
+            self._history.seek(len(self._history))
             result = self.result
             for observer in self._observers:
                 observer.on_end(self.simulation, result)

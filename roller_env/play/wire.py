@@ -23,7 +23,7 @@ FORMAT: Final = 1
 MAX_MESSAGE_BYTES: Final = 512
 """Longest message that a page may send."""
 
-_HEAD: Final = struct.Struct("<4B2IfdfHBB3f4f3fff3fHBB")
+_HEAD: Final = struct.Struct("<4B2IfdfHBB3f4f3fff3f3H")
 _KIND: Final = 1
 _CROWD_M: Final = 0.01
 """What the places of a crowd are rounded to."""
@@ -67,7 +67,7 @@ def frame_bytes(
         int(state.camera.mode[0]),
         frame.episode,
         int(state.steps[0]),
-        result.time_s,
+        max(result.time_s - frame.intro_s, 0.0),
         frame.clock_s,
         frame.control_in_s,
         result.coins,

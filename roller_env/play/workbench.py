@@ -10,6 +10,7 @@ from typing import Final
 from roller_env.game.actions import hardest_play
 from roller_env.level import Level, LevelError, examine_level, files_of, load_level
 from roller_env.physics.presets import physics_preset
+from roller_env.play.offers import OWN
 from roller_env.play.room import Message, Offer, Room
 from roller_env.play.server import listen, serve
 from roller_env.play.session import GameSession, Observer, play_config
@@ -52,7 +53,7 @@ class Workbench:
         self._saved = SavedFile(file, files_of)
         self._saved.is_new()
         level, problems = self._examined()
-        offer = Offer(str(file), level or load_level(STAND_IN))
+        offer = Offer(OWN, level or load_level(STAND_IN))
         self.room = Room(self._open, [offer], offer.name, mode="watch", skip_intro=True)
         self.room.tell_problems(problems)
 
@@ -64,7 +65,7 @@ class Workbench:
                 level, problems = await asyncio.to_thread(self._examined)
                 self.room.tell_problems(problems)
                 if level is not None:
-                    self.room.put(Offer(str(self._file), level))
+                    self.room.put(Offer(OWN, level))
 
     def _open(self, name: str, observers: Sequence[Observer]) -> GameSession:
         level = self.room.offers[name].level

@@ -28,17 +28,21 @@ class ReplayKeeper:
 
     Attributes:
         replays: what was played so far, episodes without a step left out.
+        latest: the game that ended last, None if nothing of it could be kept.
         files: where it is.
         directory: for the files; None if none are written.
     """
 
-    def __init__(self, directory: Path | None = None, player: str = "human"):
+    def __init__(
+        self, directory: Path | None = None, player: str = "human", keeps_all: bool = True
+    ):
         """Keep what is played from now on.
 
         Args:
             directory: for the files, ``classic-0000.replay`` and so on, of which none is
                 overwritten; None writes none.
             player: who plays, in words.
+            keeps_all: whether ``replays`` has all, or none, that a long session needs no memory.
 
         Raises:
             ReplayError: nothing can be written there.
@@ -46,6 +50,8 @@ class ReplayKeeper:
         if directory is not None:
             _check_directory(directory)
         self.replays: list[Replay] = []
+        self.latest: Replay | None = None
+        self._keeps_all = keeps_all
         self.files: list[Path] = []
         self.directory = directory
         self._player = player
@@ -79,10 +85,10 @@ class ReplayKeeper:
     def on_end(self, *_: object) -> None:
         """Keep the recording: the episode is over, or was left."""
         if self._recorder is not None:
-            replay = self._keep(self._recorder)
+            self.latest = self._keep(self._recorder)
             self._recorder = None
-            if replay is not None:
-                self.replays.append(replay)
+            if self._keeps_all and self.latest is not None:
+                self.replays.append(self.latest)
 
     def _keep(self, recorder: Recorder) -> Replay | None:
         """Write the game as far as it has come, and return it if there is anything to keep.
