@@ -12,7 +12,9 @@ from typing import Final, Literal
 
 from roller_env.problems import listed
 
-Kind = Literal["levels", "replays", "sounds", "pictures", "page", "generated", "configs"]
+Kind = Literal[
+    "levels", "replays", "sounds", "pictures", "page", "generated", "configs", "policies"
+]
 
 LEVELS: Final = (
     "flat",
@@ -46,6 +48,7 @@ _IN_A_CHECKOUT: Final[dict[Kind, str]] = {
     "page": "assets/page",
     "generated": "assets/generated",
     "configs": "configs",
+    "policies": "assets/policies",
 }
 
 

@@ -5,6 +5,7 @@ Examples::
     roller play
     roller play bridge --skip-intro
     roller play --policy runs/ppo_classic-seed0
+    roller play gate --policy shipped
     roller play my_level.yaml --physics accurate
 """
 
@@ -65,7 +66,8 @@ class Arguments:
     """Of the first game; by default another one every time."""
 
     policy: Path | None = None
-    """A run's directory: its agent plays until you press a key."""
+    """A run's directory, or shipped, for the agent of each level that comes with Roller: it plays
+    until you press a key."""
 
     trust: bool = False
     """Also play an agent that is kept as pickles, as Stable-Baselines3 saves it. A pickle runs any
@@ -176,6 +178,8 @@ def game_opener(
     """Return what makes the game of a level."""
 
     def open_game(level: str, observers: Sequence[Observer]) -> GameSession:
+        if agent is not None:
+            agent.meet(level)
         return GameSession(
             replace(config, level=level),
             skip_intro=arguments.skip_intro,

@@ -6,11 +6,14 @@ Their rows are trainings' (`roller_env.lab.trainings`). The five oldest levels h
 
 from __future__ import annotations
 
+import tarfile
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from roller_env.assets import LEVELS
 from roller_env.lab import trainings
+from roller_env.lab.table import Frame
 from roller_env.lab.trainings import RECIPE, Experiment, Trial
 
 SEEDS: Final = range(50, 55)
@@ -47,3 +50,33 @@ def compile_once(recipe: Path, stem: Path) -> None:
         trainings.QUICK.trials[:1], (*trainings.QUICK.changes, *EXPERIMENT.changes[1:])
     )
     trainings.run(first, recipe, stem, jobs=1)
+
+
+def ship(rows: Frame, policies: Path, out: Path) -> Iterator[str]:
+    """Write an agent of each level, and say which: the first that learnt it, or else the best.
+
+    The best is the one with most of the finished games times coins.
+
+    Args:
+        rows: trainings, with ``is_learnt``.
+        policies: tar file with ``LEVEL-SEED/policy.json`` and ``.safetensors``.
+        out: directory of a directory a level.
+    """
+    with tarfile.open(policies) as archive:
+        kept = {Path(name).parent.name for name in archive.getnames()}
+        for level in LEVELS:
+            row = max(
+                (row for row in _rows_of(rows, level) if f"{level}-{row.seed}" in kept),
+                key=lambda row: (row.is_learnt, row.finish * row.coins, row.coins, -row.seed),
+            )
+            directory = out / level
+            directory.mkdir(parents=True, exist_ok=True)
+            for part in ("policy.json", "policy.safetensors"):
+                content = archive.extractfile(f"{level}-{row.seed}/{part}")
+                assert content is not None
+                (directory / part).write_bytes(content.read())
+            yield f"{level}: seed {row.seed}, {row.finish:.0%} at the finish, {row.coins:.1%} coins"
+
+
+def _rows_of(rows: Frame, level: str) -> Iterator[Any]:
+    yield from rows[(rows.level == level) & ~rows.is_cut].itertuples(index=False)

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 
 from roller_env.assets import LEVELS
 from roller_env.lab import chart
-from roller_env.lab.aggregates import interquartile_mean, stratified
+from roller_env.lab.aggregates import stratified
 from roller_env.lab.baselines import SEEDS
 from roller_env.lab.table import Frame, markdown
 from roller_env.lab.trainings import GOOD, UNFINISHED
@@ -211,9 +211,9 @@ def draw_levels(rows: Frame) -> Figure:
         (1, 2),
         "What a training comes to, and what it takes",
         "Left: shares of the coins and of the games at the finish, 100 games with the likeliest "
-        f"actions on MuJoCo's default. Right: steps until {REACHED:.0%} of the training's games ended "
-        "at the finish for good; a cross: never, in that many steps. Rings and grey crosses: cut off "
-        "by a deadline.",
+        f"actions on MuJoCo's default. Right: steps until {REACHED:.0%} of the training's games "
+        "ended at the finish for good; a cross: never, in that many steps. Rings and grey crosses: "
+        "cut off by a deadline.",
         panel=(3.9, 5.6),
         margins=(0.95, 0.35, 1.15, 0.95),
         sharey=True,
