@@ -53,12 +53,10 @@ def compile_once(recipe: Path, stem: Path) -> None:
 
 
 def ship(rows: Frame, policies: Path, out: Path) -> Iterator[str]:
-    """Write an agent of each level, and say which: the first that learnt it, or else the best.
-
-    The best is the one with most of the finished games times coins.
+    """Write the best agent of each level, and say which: by finished games times coins.
 
     Args:
-        rows: trainings, with ``is_learnt``.
+        rows: trainings, with ``is_cut``; those that were cut off are not shipped.
         policies: tar file with ``LEVEL-SEED/policy.json`` and ``.safetensors``.
         out: directory of a directory a level.
     """
@@ -67,7 +65,7 @@ def ship(rows: Frame, policies: Path, out: Path) -> Iterator[str]:
         for level in LEVELS:
             row = max(
                 (row for row in _rows_of(rows, level) if f"{level}-{row.seed}" in kept),
-                key=lambda row: (row.is_learnt, row.finish * row.coins, row.coins, -row.seed),
+                key=lambda row: (row.finish * row.coins, row.coins, -row.seed),
             )
             directory = out / level
             directory.mkdir(parents=True, exist_ok=True)

@@ -119,7 +119,7 @@ def totals_table(rows: Frame) -> str:
     by_seed, by_level = ended.groupby("seed").size(), ended.groupby("level").size()
     every_level = ended[ended.seed.isin(by_seed[by_seed == len(LEVELS)].index)]
     every_seed = ended[ended.level.isin(by_level[by_level == len(SEEDS)].index)]
-    return markdown(Frame([_total(every_level), _total(every_seed)]))
+    return markdown(Frame([_total(own) for own in (every_level, every_seed) if len(own)]))
 
 
 def _total(rows: Frame) -> dict[str, str]:
@@ -149,8 +149,8 @@ def each_table(rows: Frame) -> str:
         | {str(row.seed): told(row) for row in rows[rows.level == level].itertuples(index=False)}
         for level in LEVELS
     ]
-    table = Frame(kept).fillna("-")
-    return markdown(table[["level", *(str(seed) for seed in SEEDS)]])
+    columns = ["level", *(str(seed) for seed in SEEDS)]
+    return markdown(Frame(kept).reindex(columns=columns).astype(object).fillna("-"))
 
 
 @chart.styled
