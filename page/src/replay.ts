@@ -1,14 +1,14 @@
 /** A replay in a file of its own: states that were recorded, played without a server. */
 
 import { between } from "./frames";
-import { begin, Page } from "./page";
+import { Page } from "./page";
 import type { Frame, Phase, ResultMessage, Scene, ToServer } from "./types";
 import { decodeFrame } from "./wire";
 
 const POINTS_PER_COIN = 10;
 
 /** What the HTML round this script has put there. */
-interface Recorded {
+export interface Recorded {
   /** base64 of gzip of the scene's JSON. */
   scene: string;
   /** base64 of gzip of frames, one after the other. */
@@ -33,6 +33,7 @@ class Replay {
   private speed = 1;
   private playing = true;
   private shownAtS: number | null = null;
+  private shownPlaceS = -1;
 
   constructor(
     root: HTMLElement,
@@ -68,6 +69,7 @@ class Replay {
       scene: "",
       control_dt_s: 1 / recorded.rate_hz,
       points_per_coin: POINTS_PER_COIN,
+      ghost: "none",
     };
     this.result = resultOf(recorded, scene);
     view.timeline = { type: "timeline", first_s: 0, last_s: this.lastS, can_branch: false };
@@ -81,17 +83,22 @@ class Replay {
     this.shownAtS = nowS;
     if (this.playing) this.go(this.placeS + this.speed * Math.max(elapsedS, 0));
     if (this.placeS === this.lastS) this.playing = false;
-    const place = this.placeS * this.recorded.rate_hz;
-    const before = this.frames[Math.floor(place)] as Frame;
-    const after = this.frames[Math.ceil(place)] as Frame;
-    const frame = {
-      ...between(before, after, place - Math.floor(place)),
-      phase: this.phase(),
-      speed: this.speed,
-    };
+    const [phase, before] = [this.phase(), this.page.view.frame];
+    const isShown = before?.phase === phase && before.speed === this.speed;
+    if (isShown && this.placeS === this.shownPlaceS) return before;
+    this.shownPlaceS = this.placeS;
+    const frame = { ...this.frameOf(this.placeS), phase, speed: this.speed };
     this.page.view.frame = frame;
-    this.page.view.result = frame.phase === "ended" ? this.result : null;
+    this.page.view.result = phase === "ended" ? this.result : null;
     return frame;
+  }
+
+  private frameOf(placeS: number): Frame {
+    const { frames } = this;
+    const place = Math.min(placeS * this.recorded.rate_hz, frames.length - 1);
+    const first = Math.floor(place);
+    const before = frames[first] as Frame;
+    return between(before, frames[first + 1] ?? before, place - first);
   }
 
   private phase(): Phase {
@@ -150,9 +157,8 @@ async function unpack(base64: string): Promise<ArrayBuffer> {
   return new Response(unpacked).arrayBuffer();
 }
 
-async function start(root: HTMLElement): Promise<void> {
-  const recorded = window.ROLLER;
-  if (recorded === undefined) throw new Error("there is no replay in this file");
+/** Unpack a replay, and play it in an element. */
+export async function openReplay(root: HTMLElement, recorded: Recorded): Promise<void> {
   const scene = JSON.parse(new TextDecoder().decode(await unpack(recorded.scene))) as Scene;
   const data = await unpack(recorded.frames);
   const count = Math.floor(data.byteLength / recorded.frame_bytes);
@@ -162,5 +168,3 @@ async function start(root: HTMLElement): Promise<void> {
   );
   new Replay(root, recorded, scene, frames);
 }
-
-void begin(start);

@@ -203,6 +203,8 @@ export interface LevelMessage {
   scene: string;
   control_dt_s: number;
   points_per_coin: number;
+  /** Against whom one races. */
+  ghost: "none" | "best" | "par";
 }
 
 export interface SeatMessage {

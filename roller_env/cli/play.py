@@ -6,6 +6,8 @@ Examples::
     roller play bridge --skip-intro
     roller play --policy runs/ppo_classic-seed0
     roller play gate --policy shipped
+    roller play --policy runs/ppo_classic-seed0 --agents 64
+    roller play classic --against runs/ppo_classic-seed0
     roller play my_level.yaml --physics accurate
 """
 
@@ -32,6 +34,7 @@ from roller_env.replay.keeper import ReplayKeeper
 
 if TYPE_CHECKING:
     from roller_env.play.autopilot import Autopilot
+    from roller_env.play.crowd import Crowd
 
 RECORDED: Final = Path("replays")
 """Where games are kept that are to become data sets, if nothing else is asked for."""
@@ -68,6 +71,13 @@ class Arguments:
     policy: Path | None = None
     """A run's directory, or shipped, for the agent of each level that comes with Roller: it plays
     until you press a key."""
+
+    against: Path | None = None
+    """A run's directory: balls of its agent play beside the game; by default, with --agents, those
+    of --policy."""
+
+    agents: int | None = None
+    """How many balls play beside the game, up to 256; by default one, with --against."""
 
     trust: bool = False
     """Also play an agent that is kept as pickles, as Stable-Baselines3 saves it. A pickle runs any
@@ -116,14 +126,19 @@ def play(arguments: Arguments) -> int:
     config, agent = game_of(arguments)
     keeper = ReplayKeeper(directory, "human" if agent is None else "agent and human")
     records = Records(arguments.records or default_file())
+    crowd = crowd_of(agent, arguments)
+    offers = offers_of(config.level)
+    for policy in [each.policy for each in (agent, crowd) if each is not None]:
+        offers = [offer for offer in offers if policy.plays(offer.level)]
     room = Room(
         game_opener(config, agent, arguments),
-        offers_of(config.level),
+        offers,
         str(config.level),
         keeper=keeper,
         records=records,
         agent=agent,
         agent_name=arguments.policy.name if arguments.policy else "",
+        crowd=crowd,
         quality=arguments.quality,
         skip_intro=arguments.skip_intro,
     )
@@ -170,6 +185,23 @@ def game_of(arguments: Arguments) -> tuple[EnvConfig, Autopilot | None]:
     return load_autopilot(
         arguments.policy, arguments.level, arguments.physics, trust=arguments.trust
     )
+
+
+def crowd_of(agent: Autopilot | None, arguments: Arguments) -> Crowd | None:
+    """Return the balls that play beside the game, if any do."""
+    if arguments.against is None and arguments.agents is None:
+        return None
+    # Imported here: it takes torch, which a person's game does not need.
+    from roller_env.play.crowd import Crowd
+    from roller_env.training.policy import load_policy
+
+    if arguments.against is not None:
+        policy = load_policy(arguments.against, trust=arguments.trust)
+    elif agent is not None:
+        policy = agent.policy
+    else:
+        raise ValueError("agents: found no agent to play; --against or --policy names one")
+    return Crowd(policy, 1 if arguments.agents is None else arguments.agents)
 
 
 def game_opener(

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, Protocol
 
 from roller_env.arrays import Float64
+from roller_env.game.actions import KEYS
 from roller_env.game.result import EpisodeResult
 from roller_env.game.state import COIN_ON_PANELS
 from roller_env.level import Level
@@ -40,6 +41,7 @@ from roller_env.simulation import Simulation, Transition
 
 if TYPE_CHECKING:
     from roller_env.play.autopilot import Autopilot
+    from roller_env.play.crowd import Crowd
 
 FRAME_S: Final = 1 / 60
 STANDING_FRAME_S: Final = 1 / 10
@@ -105,6 +107,7 @@ class Room:
         records: Records | None = None,
         agent: Autopilot | None = None,
         agent_name: str = "",
+        crowd: Crowd | None = None,
         quality: Literal["high", "low"] = "high",
         skip_intro: bool = False,
     ) -> None:
@@ -120,6 +123,7 @@ class Room:
             records: of what people reach; None keeps them as long as the room.
             agent: who plays until a key is held.
             agent_name: what pages call it.
+            crowd: balls that play beside the game.
             quality: of the picture, as pages are told.
             skip_intro: whether the keys work at once, as pages are told.
         """
@@ -128,13 +132,13 @@ class Room:
         self.keeper = keeper or ReplayKeeper()
         self._open, self._name, self._mode = open_game, chosen, mode
         self._records = records or Records()
-        self._agent, self._agent_name = agent, agent_name
+        self._agent, self._agent_name, self._crowd = agent, agent_name, crowd
         self._quality, self._skip_intro = quality, skip_intro
         self._game: Game | None = None
         self._guests: list[Guest] = []
         self._player: Guest | None = None
         self._asking: list[Guest] = []
-        self._held, self._told_s = "", 0.0
+        self._held, self._tapped, self._told_s = "", "", 0.0
         self._ghost: Ghost | None = None
         self._ghost_kind: GhostKind = "none"
         self._ended: list[tuple[EpisodeResult, bool]] = []
@@ -174,7 +178,7 @@ class Room:
         self._player = self._asking.pop(0) if self._asking else otherwise
         if self._player is before:
             return
-        self._held = ""
+        self._held = self._tapped = ""
         self._wishes = [wish for wish in self._wishes if isinstance(wish, Choose)]
         if self._game is not None and self._mode != "replay":
             self._game.pause()
@@ -200,6 +204,7 @@ class Room:
             self._seat_next(guest)
         elif isinstance(wish, Keys):
             self._held, self._told_s = wish.held, time.monotonic()
+            self._tapped = "".join(key for key in KEYS if key in self._tapped + wish.held)
         else:
             self._wishes.append(wish)
             self._woken.set()
@@ -262,9 +267,11 @@ class Room:
         """Let the game go on and show it."""
         game, now = self._played, time.monotonic()
         if now - self._told_s > KEYS_GO_STALE_S:
-            self._held = ""
+            self._held = self._tapped = ""
         was = game.phase
-        game.advance(elapsed_s, self._held)
+        # A key that went down and up since the last look has been held.
+        if game.advance(elapsed_s, self._tapped or self._held):
+            self._tapped = ""
         self._count_ends()
         if self._mode == "replay" or (game.phase is Phase.PAUSED and was is not Phase.PAUSED):
             self._tell_timeline()
@@ -279,7 +286,8 @@ class Room:
         ghost = None
         if self._ghost is not None and frame.phase in (Phase.PLAYING, Phase.PAUSED, Phase.ENDED):
             ghost = self._ghost.at(frame.result.time_s)
-        shown = frame_bytes(frame, self.scene, ghost, bool(self.keeper.directory))
+        crowd = None if self._crowd is None else self._crowd.centres(frame.fraction)
+        shown = frame_bytes(frame, self.scene, ghost, crowd, self.keeper.directory is not None)
         for guest in self._guests:
             guest.show(shown)
 
@@ -323,10 +331,12 @@ class Room:
         if self._game is not None:
             self._game.close()
             self._count_ends()
-        self._name, self._held = name, ""
+        self._name = name
+        self._held = self._tapped = ""
 
         def load() -> tuple[Game, Scene]:
-            game = self._open(name, (self.keeper, self))
+            beside = () if self._crowd is None else (self._crowd,)
+            game = self._open(name, (self.keeper, self, *beside))
             if isinstance(game, GameSession):
                 game.warm_up()
             scene = Scene(game.level)
@@ -412,6 +422,7 @@ class Room:
             scene=f"/scene/{self.scene.hash}.json",
             control_dt_s=self._game.control_dt_s,
             points_per_coin=COIN_ON_PANELS,
+            ghost=self._ghost_kind,
         )
 
     def _timeline(self) -> Message | None:

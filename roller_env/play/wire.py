@@ -25,6 +25,9 @@ MAX_MESSAGE_BYTES: Final = 512
 
 _HEAD: Final = struct.Struct("<4B2IfdfHBB3f4f3fff3fHBB")
 _KIND: Final = 1
+_CROWD_M: Final = 0.01
+"""What the places of a crowd are rounded to."""
+
 _PHASES: Final = tuple(Phase)
 _OUTCOMES: Final = ("not ended", "finish", "fall", "diverged", "time limit")
 
@@ -32,7 +35,11 @@ _AGENT, _AGENT_PLAYS, _RECORDING, _GHOST, _PRACTICE = (1 << bit for bit in range
 
 
 def frame_bytes(
-    frame: GameFrame, scene: Scene, ghost: Float64 | None = None, recording: bool = False
+    frame: GameFrame,
+    scene: Scene,
+    ghost: Float64 | None = None,
+    crowd: Float64 | None = None,
+    recording: bool = False,
 ) -> bytes:
     """Return a frame as pages read it.
 
@@ -40,6 +47,7 @@ def frame_bytes(
         frame: the moment.
         scene: of its level.
         ghost: (3,) centre of the ball that is raced against, metres.
+        crowd: (N, 3) centres of balls that play beside it, metres.
         recording: whether replays are written.
     """
     qpos, state, result = frame.qpos(), frame.state, frame.result
@@ -75,7 +83,11 @@ def frame_bytes(
         len(phases),
     )
     coins = coin_bits(state.of(COIN).taken[0, : scene.coins])
-    return b"".join([head, displacements.astype("<f4").tobytes(), bytes(phases), coins])
+    parts = [head, displacements.astype("<f4").tobytes(), bytes(phases), coins]
+    if crowd is not None:
+        near = np.clip(np.round(crowd / _CROWD_M), -(2**15), 2**15 - 1)
+        parts += [struct.pack("<H", len(crowd)), near.astype("<i2").tobytes()]
+    return b"".join(parts)
 
 
 def keys_of(force_n: Float64) -> int:

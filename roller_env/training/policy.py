@@ -13,6 +13,7 @@ import json
 import math
 import os
 import pickle
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Protocol
@@ -30,7 +31,8 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from roller_env import __version__
 from roller_env.arrays import Float64
-from roller_env.envs.spaces import Observations
+from roller_env.config import LevelSource
+from roller_env.envs.spaces import Observations, entries_of
 from roller_env.problems import field_name, shown
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.files import RunError, RunFiles, read_whole, write_atomically
@@ -90,6 +92,15 @@ class TrainedPolicy:
         seen = observations if self.normalisation is None else self.normalisation(observations)
         actions, _ = self.network.predict(seen, deterministic=True)
         return actions
+
+    def plays(self, level: LevelSource) -> bool:
+        """Say whether a level shows what this agent has learnt to see: the same entries."""
+        trained = self.config.evaluation_environment
+        mine, its = (
+            [(entry.name, entry.size) for entry in entries_of(config)]
+            for config in (trained, replace(trained, level=level))
+        )
+        return mine == its
 
     def judge(self, observations: Observations, /) -> tuple[Float64 | None, Float64]:
         """Return what the agent thinks of its choice, and of where it is.

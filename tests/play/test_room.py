@@ -172,6 +172,20 @@ def test_keys_of_which_nothing_is_heard_are_let_go(monkeypatch: pytest.MonkeyPat
     among(room, scene)
 
 
+def test_a_key_that_is_tapped_between_two_frames_pushes_all_the_same() -> None:
+    room = played()
+
+    async def scene() -> None:
+        player = Somebody(room)
+        await started(player)
+        player.say('{"type":"keys","held":"w"}')
+        player.say('{"type":"keys","held":""}')
+        await until(lambda: struct.unpack_from("<f", player.frames[-1], 60)[0] > 0.0)
+        await until(lambda: player.frames[-1][30] == 0)
+
+    among(room, scene)
+
+
 def test_a_finish_is_a_record_and_with_every_coin_leads_to_the_next_level() -> None:
     first = lane(par_time_s=30.0)
     second = lane(name="second")

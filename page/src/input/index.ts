@@ -33,7 +33,10 @@ export class Input {
     this.stick = new TouchStick(target, () => this.changed());
     window.addEventListener("keydown", (event) => this.keyDown(event));
     window.addEventListener("keyup", (event) => {
-      if (this.codes.delete(event.code)) this.tell();
+      // While Meta is held, macOS does not tell that other keys are let go.
+      if (event.key === "Meta") this.codes.clear();
+      this.codes.delete(event.code);
+      this.tell();
     });
     window.addEventListener("blur", () => this.leave());
     document.addEventListener("visibilitychange", () => {
@@ -68,7 +71,7 @@ export class Input {
     const command = commandOf(event.key, event.code, place);
     if (command !== null) {
       event.preventDefault();
-      if (!event.repeat || place !== "game") giveCommand(command);
+      if (!event.repeat || event.code.startsWith("Arrow")) giveCommand(command);
     } else if (event.code in DIRECTION_KEYS && place !== "replay") {
       if (event.code.startsWith("Arrow")) event.preventDefault();
       if (event.repeat) return;
@@ -129,9 +132,13 @@ export class Input {
 
 /** Whether what has the focus does something of its own with a key. */
 function isTakenBy(target: EventTarget | null, { key }: KeyboardEvent): boolean {
-  if (target instanceof HTMLButtonElement) return key === "Enter" || key === " ";
+  if (target instanceof HTMLButtonElement && (key === "Enter" || key === " ")) return true;
   if (target instanceof HTMLSelectElement) return key !== "Escape";
-  return target instanceof HTMLInputElement && (key.startsWith("Arrow") || key === " ");
+  const inField = target instanceof HTMLInputElement;
+  if (key === " ") return inField && target.type === "checkbox";
+  // Panels scroll with the arrows, but on the start page they choose.
+  const inPanel = target instanceof Element && target.closest(".dialog:not(.start)") !== null;
+  return key.startsWith("Arrow") && (inField || inPanel);
 }
 
 /** Whether the page is used with fingers. */

@@ -1,6 +1,7 @@
 import { beforeEach, expect, it, vi } from "vitest";
 import { clearPages, fakeFrame, fakeView } from "../fakes";
 import type { ToServer } from "../types";
+import { type Command, onCommand } from "./commands";
 import { Input } from "./index";
 
 let sent: ToServer[];
@@ -76,6 +77,17 @@ it("tells nothing where keys do not push", () => {
     key("keyup", "KeyW");
   }
   expect(sent).toEqual([]);
+});
+
+it("pauses a replay with Space though the bar of its time line has the focus", () => {
+  input.update(fakeView({}, { mode: "replay" }));
+  const commands: Command[] = [];
+  onCommand((command) => commands.push(command));
+  const bar = document.createElement("input");
+  bar.type = "range";
+  document.body.append(bar);
+  bar.dispatchEvent(new KeyboardEvent("keydown", { code: "Space", key: " ", bubbles: true }));
+  expect(commands).toEqual(["pause"]);
 });
 
 it("leaves the keys to a field or button that has the focus", () => {

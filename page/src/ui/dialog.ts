@@ -15,7 +15,13 @@ export class Dialog {
   constructor(label: string, kind: string, ...children: Node[]) {
     this.element = make(
       "section",
-      { role: "dialog", "aria-label": label, class: `dialog ${kind}`, tabindex: "-1" },
+      {
+        role: "dialog",
+        "aria-modal": "true",
+        "aria-label": label,
+        class: `dialog ${kind}`,
+        tabindex: "-1",
+      },
       ...children,
     );
     this.element.hidden = true;

@@ -1,6 +1,6 @@
 /** The panel of a game that is over. */
 
-import type { Actions, Frame, LevelRow, ResultMessage, View } from "../types";
+import type { Actions, LevelRow, ResultMessage, View } from "../types";
 import { Dialog } from "./dialog";
 import { button, make, setShown, setText } from "./dom";
 import { formatLead, formatTime } from "./format";
@@ -22,8 +22,9 @@ export class EndPanel extends Dialog {
   private readonly next: HTMLButtonElement;
   private readonly again: HTMLButtonElement;
   private readonly buttons: HTMLElement;
-  private shown: ResultMessage | number | null = null;
+  private shown: ResultMessage | null = null;
 
+  /** @param actions - what the server is told by. */
   constructor(actions: Actions) {
     super("The game is over", "end");
     this.next = button("Next level", "main", () => actions.send({ type: "next" }));
@@ -35,19 +36,17 @@ export class EndPanel extends Dialog {
 
   /** Show a game's result; before it is shown. */
   update(view: View): void {
-    const { hello, level, frame, scene, seat } = view;
+    const { hello, level, result, scene, seat } = view;
     setShown(this.buttons, seat === "player");
-    const news = view.result ?? frame?.episode ?? null;
-    if (frame === null || scene === null || news === this.shown) return;
-    this.shown = news;
-    const result = view.result ?? resultOf(frame, scene.coins, level?.points_per_coin ?? 0);
+    if (result === null || result === this.shown) return;
+    this.shown = result;
     const row = hello?.levels.find((one) => one.name === level?.name) ?? null;
     setText(this.title, TITLES[result.outcome]);
     this.medal.replaceChildren(...(result.medal ? [drawMedal(result.medal)] : []));
     setShown(this.medal, result.medal !== null);
     setText(this.word, wordOf(result));
     setShown(this.word, this.word.textContent !== "");
-    const told = rowsOf(result, row, scene.par_time_s);
+    const told = rowsOf(result, row, scene?.par_time_s ?? null);
     this.rows.replaceChildren(
       ...told.map(([name, value, note]) =>
         make("div", {}, make("dt", {}, name), make("dd", {}, value, make("small", {}, note))),
@@ -60,30 +59,12 @@ export class EndPanel extends Dialog {
   }
 }
 
-/** Return what a frame says of how its game ended, for who comes after that has been told. */
-function resultOf(frame: Frame, coins: number, pointsPerCoin: number): ResultMessage {
-  return {
-    type: "result",
-    outcome: frame.outcome === "none" ? "time limit" : frame.outcome,
-    coins: frame.coins,
-    coins_in_level: coins,
-    score_percent: coins > 0 ? (100 * frame.coins) / coins : 100,
-    time_s: frame.timeS,
-    points: pointsPerCoin * frame.coins,
-    medal: null,
-    best_time: false,
-    best_coins: false,
-    counts: !frame.rewound,
-    next: null,
-  };
-}
-
 /** What is to be said of a result at once. */
 export function wordOf(result: ResultMessage): string {
   if (!result.counts) return "Practice: this one does not count.";
   if (result.outcome !== "finish") return "";
   const left = result.coins_in_level - result.coins;
-  if (left > 0 && result.next === null) return `Every coin opens the next level: ${left} left.`;
+  if (left > 0 && result.next === null) return `The next level asks for every coin: ${left} left.`;
   return result.best_time ? "A new best time!" : "";
 }
 

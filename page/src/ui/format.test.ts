@@ -17,6 +17,7 @@ it("writes by how much one was faster or slower", () => {
   expect(formatLead(18.8, 20)).toBe("−1.2 s");
   expect(formatLead(21.5, 20)).toBe("+1.5 s");
   expect(formatLead(20.01, 20)).toBe("±0.0 s");
+  expect(formatLead(4.14, 3.18)).toBe("+0.9 s");
 });
 
 it("counts things", () => {

@@ -8,9 +8,9 @@ export function formatTime(seconds: number): string {
   return `${minutes}:${((tenths % 600) / 10).toFixed(1).padStart(4, "0")}`;
 }
 
-/** A time beside another one: "−1.2 s" is faster. */
+/** A time beside another one, as both are read: "−1.2 s" is faster. */
 export function formatLead(seconds: number, other: number): string {
-  const lead = Math.round((seconds - other) * 10) / 10;
+  const lead = (Math.round(seconds * 10) - Math.round(other * 10)) / 10;
   return `${lead > 0 ? "+" : lead < 0 ? "−" : "±"}${Math.abs(lead).toFixed(1)} s`;
 }
 

@@ -19,7 +19,7 @@ export class Hints {
     const shown = !this.done && first && seat === "player" && frame?.phase === "playing";
     if (frame?.outcome === "finish" && seat === "player") this.finish();
     setShown(this.element, shown && scene !== null && !frame.agentPlays);
-    if (shown && scene !== null) setText(this.element, hintFor(frame, scene.start, isTouched()));
+    if (shown && scene !== null) setText(this.element, hintFor(frame, scene.start, isHandheld()));
   }
 
   private finish(): void {
@@ -59,6 +59,6 @@ function stored(): boolean {
   }
 }
 
-function isTouched(): boolean {
+function isHandheld(): boolean {
   return matchMedia("(pointer: coarse)").matches;
 }

@@ -26,7 +26,7 @@ export class Hud {
   constructor(openSettings: () => void) {
     this.panel = make(
       "div",
-      { class: "panel score", "aria-hidden": "true" },
+      { class: "panel score" },
       make("div", { class: "score-line" }, this.points, this.time),
       make("div", { class: "score-line" }, this.coins, this.bar),
       this.reach,
@@ -36,9 +36,10 @@ export class Hud {
     this.reach.append(this.reachText);
     const tools = make("nav", { class: "hud-tools", "aria-label": "Game" });
     const tool = (icon: IconName, label: string, command: Command): void => {
-      this.buttons[command] = button("", "tool", () => giveCommand(command));
+      const one = button("", "tool", () => giveCommand(command));
+      this.buttons[command] = one;
       this.label(command, icon, label);
-      tools.append(this.buttons[command]);
+      tools.append(one);
     };
     tool("pause", "Pause (P)", "pause");
     tool("restart", "Restart (R)", "restart");
@@ -50,6 +51,11 @@ export class Hud {
     settings.title = "Settings";
     tools.append(settings);
     tool("help", "Help (H)", "help");
+    // After a click the keys are the game's again: Enter is not to press the same once more.
+    tools.addEventListener("click", ({ detail }) => {
+      if (detail > 0 && document.activeElement instanceof HTMLElement)
+        document.activeElement.blur();
+    });
     this.element = make("div", { class: "hud" }, this.panel, tools);
   }
 
@@ -75,7 +81,8 @@ export class Hud {
     this.show("research", hello !== null && (hello.mode !== "watch" || frame.hasAgent));
     if (settings.muted) this.label("mute", "mute", "Sound on (M)");
     else this.label("mute", "sound", "Sound off (M)");
-    if (frame.phase === "paused") this.label("pause", "play", "Go on (P)");
+    const stands = frame.phase === "paused" || frame.phase === "ended";
+    if (stands) this.label("pause", "play", "Go on (P)");
     else this.label("pause", "pause", "Pause (P)");
   }
 
@@ -108,7 +115,7 @@ export class Hud {
     const marks = [
       ...(frame?.recording ? ["● recording"] : []),
       ...(frame?.rewound && hello?.mode === "play" ? ["practice, does not count"] : []),
-      ...(frame && frame.speed !== 1 ? [`${frame.speed}× speed`] : []),
+      ...(frame && frame.speed !== 1 ? [`${Number(frame.speed.toPrecision(2))}× speed`] : []),
     ];
     setShown(this.marks, marks.length > 0);
     setText(this.marks, marks.join(" · "));

@@ -21,7 +21,7 @@ import { Timeline } from "./timeline";
 const SEEK_S = 1;
 
 /** The panel that the game asks for, below what a person has opened. */
-export type Base = "start" | "pause" | "end" | null;
+type Base = "start" | "pause" | "end" | null;
 
 /**
  * Return the panel that the game asks for.
@@ -30,12 +30,12 @@ export type Base = "start" | "pause" | "end" | null;
  * @param research - whether the researcher's panels are open: they take the place of the pause's.
  * @param before - the one of the moment before; the start page stays while a level is loaded.
  */
-export function baseOf(view: View, research: boolean, before: Base): Base {
-  const { hello, seat, frame, level } = view;
+function baseOf(view: View, research: boolean, before: Base): Base {
+  const { hello, seat, frame, level, result } = view;
   if (hello === null || hello.mode === "replay") return null;
   const choosing = frame === null ? level === null || before === "start" : frame.phase === "start";
   if (frame === null || choosing) return choosing && seat === "player" ? "start" : null;
-  if (frame.phase === "ended") return "end";
+  if (frame.phase === "ended") return result === null ? null : "end";
   return frame.phase === "paused" && seat === "player" && !research ? "pause" : null;
 }
 
@@ -87,7 +87,7 @@ export class Ui {
       { class: "below" },
       this.hud.element,
       this.intro.element,
-      this.messages.element,
+      ...this.messages.elements,
       this.researchPanel.element,
       foot,
     );
@@ -122,8 +122,8 @@ export class Ui {
     this.problems.update(view);
     const replay = view.hello?.mode === "replay";
     const inGame = view.frame !== null && base !== "start" && base !== "end";
-    this.researchPanel.update(view, research && inGame && (!replay || view.agent !== null));
-    this.timeline.update(view, research && inGame);
+    this.researchPanel.update(view, research && inGame);
+    this.timeline.update(view, (research || replay) && inGame);
     this.showPanels();
   }
 

@@ -14,6 +14,7 @@ export class Intro {
   private readonly wait = make("span", { class: "wait" });
   private readonly skip: HTMLButtonElement;
 
+  /** @param actions - what the server is told by. */
   constructor(actions: Actions) {
     this.skip = button("Begin", "main", () => actions.send({ type: "skip" }));
     this.element = make(

@@ -29,7 +29,7 @@ class Passing {
 
 /** Messages over the game, and what screen readers are told of it. */
 export class Messages {
-  readonly element: HTMLElement;
+  readonly elements: readonly HTMLElement[];
   private readonly fall = new Passing("fall", "alert");
   private readonly camera = new Passing("camera");
   private readonly notice = make("p", { class: "panel notice", role: "status", hidden: "" });
@@ -41,7 +41,7 @@ export class Messages {
   constructor() {
     const top = make("div", { class: "messages" }, this.agent, this.notice);
     top.append(this.camera.element, this.fall.element);
-    this.element = make("div", {}, top, this.told);
+    this.elements = [top, this.told];
   }
 
   /**

@@ -16,6 +16,8 @@ export class ConnectionOverlay {
   }
 
   /**
+   * Show it if it is needed.
+   *
    * @param view - how the game stands.
    * @param choosing - whether the start page is there: it says itself that a level is being loaded.
    */
@@ -38,6 +40,7 @@ export class SeatLine {
   private readonly ask: HTMLButtonElement;
   private asked = false;
 
+  /** @param actions - what the server is asked by. */
   constructor(actions: Actions) {
     this.ask = button("Ask to play", "main", () => {
       this.asked = true;
@@ -46,8 +49,9 @@ export class SeatLine {
     this.element = make("div", { class: "panel seat", role: "status" }, this.text, this.ask);
   }
 
-  update({ seat, frame, hello }: View): void {
-    if (seat === "player") this.asked = false;
+  /** Show it to who watches. */
+  update({ seat, frame, hello, connection }: View): void {
+    if (seat === "player" || connection === "lost") this.asked = false;
     setShown(this.element, seat === "spectator" && hello !== null);
     setShown(this.ask, !this.asked);
     setText(this.text, this.asked ? "You are next when the player leaves" : watching(frame?.phase));
@@ -70,6 +74,7 @@ export class ProblemsPanel {
   });
   private shown: ProblemsMessage | null = null;
 
+  /** Show what was wrong when the file was saved last. */
   update({ problems }: View): void {
     if (problems === this.shown) return;
     this.shown = problems;

@@ -35,6 +35,7 @@ export class PausePanel extends Dialog {
     );
   }
 
+  /** Show who could play on. */
   update(view: View): void {
     this.ghost.update(view);
     setShown(this.handBack, view.frame?.hasAgent === true && !view.frame.agentPlays);

@@ -56,7 +56,6 @@ export class ResearchPanel {
   private readonly terms = new Lines((name) => new Trace(name));
   private readonly entries = new Lines((name) => new Trace(name));
   private readonly total = make("output");
-  private readonly empty = make("p", { class: "empty" }, "No agent is here to look into.");
   private readonly sections: HTMLElement[];
   private shown: AgentMessage | null = null;
 
@@ -79,7 +78,6 @@ export class ResearchPanel {
       "section",
       { class: "panel research", "aria-label": "What the agent sees", tabindex: "0" },
       head,
-      this.empty,
       ...this.sections,
     );
   }
@@ -95,7 +93,6 @@ export class ResearchPanel {
     if (!shown || frame === null) return;
     this.showKeys(frame);
     setText(this.total, formatValue(frame.totalReward));
-    setShown(this.empty, agent === null);
     for (const one of this.sections) setShown(one, agent !== null);
     if (agent === null || agent === this.shown) return;
     this.shown = agent;

@@ -1,6 +1,6 @@
 /** The start page: all levels with their pictures, the chosen one large, and Start. */
 
-import type { Actions, LevelRow, View } from "../types";
+import type { Actions, LevelMessage, LevelRow, View } from "../types";
 import { Dialog } from "./dialog";
 import { button, make, setAttribute, setShown, setText } from "./dom";
 import { counted, formatTime } from "./format";
@@ -14,6 +14,9 @@ const CHOSEN_AFTER_MS = 220;
 export class StartPage extends Dialog {
   private levels: readonly LevelRow[] = [];
   private chosen: string | null = null;
+  private level: LevelMessage | null = null;
+  /** Level that the server was asked for and has not loaded yet. */
+  private asked: string | null = null;
   private waiting = 0;
   private readonly cards = make("div", { class: "cards", role: "group", "aria-label": "Levels" });
   private readonly picture = make("img", { class: "hero-picture", alt: "", hidden: "" });
@@ -74,21 +77,23 @@ export class StartPage extends Dialog {
   update(view: View): void {
     const { hello, level } = view;
     this.ghost.update(view);
-    setText(this.status, level === null ? "Loading …" : "");
     if (hello === null) return;
-    if (hello.levels !== this.levels) {
-      this.levels = hello.levels;
-      setShown(this.cards, hello.levels.length > 1);
-      this.element.classList.toggle("alone", hello.levels.length <= 1);
-      this.chosen ??= level?.name ?? null;
-      this.cards.replaceChildren(...hello.levels.map((row) => this.card(row)));
-      this.mark();
-    }
-    if (level !== null && this.waiting === 0 && level.name !== this.chosen) {
-      this.chosen = level.name;
-      this.mark();
-      this.scrollToChosen();
-    }
+    if (hello.levels !== this.levels) this.list(hello.levels);
+    if (view.connection === "lost") this.asked = null;
+    if (level !== this.level) this.follow(level);
+    setText(this.status, level === null || this.asked !== null ? "Loading …" : "");
+  }
+
+  /** Make the cards anew; one that has the focus keeps it. */
+  private list(levels: readonly LevelRow[]): void {
+    this.levels = levels;
+    const { activeElement } = document;
+    const focused = this.cards.contains(activeElement) && (activeElement as HTMLElement);
+    setShown(this.cards, levels.length > 1);
+    this.element.classList.toggle("alone", levels.length <= 1);
+    this.cards.replaceChildren(...levels.map((row) => this.card(row)));
+    this.mark();
+    if (focused) this.cardOf(focused.dataset.level ?? "")?.focus({ preventScroll: true });
   }
 
   override show(shown: boolean): void {
@@ -114,6 +119,17 @@ export class StartPage extends Dialog {
     this.actions.send({ type: "start" });
   }
 
+  /** Another level is there: choose it, unless a person has already chosen a further one. */
+  private follow(level: LevelMessage | null): void {
+    this.level = level;
+    if (level === null) return;
+    if (level.name === this.asked) this.asked = null;
+    if (this.asked !== null || this.waiting !== 0) return;
+    this.chosen = level.name;
+    this.mark();
+    this.scrollToChosen();
+  }
+
   private choose(name: string): void {
     if (name === this.chosen) return;
     this.chosen = name;
@@ -122,11 +138,13 @@ export class StartPage extends Dialog {
     this.waiting = window.setTimeout(() => this.sendChoice(), CHOSEN_AFTER_MS);
   }
 
+  /** Have the chosen level loaded, unless it is or is about to be. */
   private sendChoice(): void {
-    if (this.waiting === 0 || this.chosen === null) return;
     window.clearTimeout(this.waiting);
-    this.actions.send({ type: "choose", level: this.chosen });
     this.waiting = 0;
+    if (this.chosen === null || this.chosen === (this.asked ?? this.level?.name)) return;
+    this.asked = this.chosen;
+    this.actions.send({ type: "choose", level: this.chosen });
   }
 
   private card(row: LevelRow): HTMLButtonElement {
@@ -182,7 +200,7 @@ export class StartPage extends Dialog {
 }
 
 /** What is told of a level in a line. */
-export function factsOf(row: LevelRow): string[] {
+function factsOf(row: LevelRow): string[] {
   const par = row.par_time_s === null ? [] : [`par ${formatTime(row.par_time_s)}`];
   const best = row.best_time_s === null ? [] : [`best ${formatTime(row.best_time_s)}`];
   const tries = row.attempts > 0 ? [counted(row.attempts, "attempt")] : [];

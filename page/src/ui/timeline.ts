@@ -6,7 +6,7 @@ import { button, make, setAttribute, setShown, setText } from "./dom";
 import { formatTime } from "./format";
 import { drawIcon } from "./icon";
 
-export const SPEEDS: readonly number[] = [0.1, 0.25, 0.5, 1, 2];
+const SPEEDS: readonly number[] = [0.1, 0.25, 0.5, 1, 2];
 
 /** A moment so near to the last one is the last one; seconds, less than any control step. */
 const AT_END_S = 5e-4;
@@ -25,6 +25,7 @@ export class Timeline {
   private sought: number | null = null;
   private waiting = 0;
 
+  /** @param actions - what the server is told by. */
   constructor(private readonly actions: Actions) {
     this.play = button(drawIcon("pause"), "tool", () => giveCommand("pause"));
     this.step = button(drawIcon("step"), "tool", () => giveCommand("step"));
@@ -40,9 +41,11 @@ export class Timeline {
     this.bar.addEventListener("change", () => this.sendSeek());
     const speeds = SPEEDS.map((one) => make("option", { value: String(one) }, `${one}×`));
     this.speed.append(...speeds);
-    this.speed.addEventListener("change", () =>
-      actions.send({ type: "speed", factor: Number(this.speed.value) }),
-    );
+    this.speed.addEventListener("change", () => {
+      actions.send({ type: "speed", factor: Number(this.speed.value) });
+      // A list that has the focus takes letters, which are to push the ball.
+      this.speed.blur();
+    });
     this.branch = button("Go on from here", "main", () => actions.send({ type: "resume" }));
     this.element = make(
       "section",
@@ -68,11 +71,12 @@ export class Timeline {
     if (!shown || frame === null) return;
     const paused = frame.phase === "paused";
     const replay = hello?.mode === "replay";
-    const label = paused ? "Go on" : "Pause";
+    const stands = paused || frame.phase === "ended";
+    const label = stands ? "Go on" : "Pause";
     if (this.play.title !== label) {
       this.play.title = label;
       setAttribute(this.play, "aria-label", label);
-      this.play.replaceChildren(drawIcon(paused ? "play" : "pause"));
+      this.play.replaceChildren(drawIcon(stands ? "play" : "pause"));
     }
     this.step.disabled = !paused;
     const seekable = timeline !== null && (paused || replay);
@@ -81,7 +85,8 @@ export class Timeline {
       setAttribute(this.bar, "min", String(timeline.first_s));
       setAttribute(this.bar, "max", String(Math.max(timeline.last_s, frame.timeS)));
     }
-    if (this.sought === null) this.bar.value = String(frame.timeS);
+    if (!seekable) this.bar.value = this.bar.max;
+    else if (this.sought === null) this.bar.value = String(frame.timeS);
     const last = seekable ? ` / ${formatTime(timeline.last_s)}` : "";
     setText(this.moment, formatTime(this.sought ?? frame.timeS) + last);
     const speed = String(SPEEDS.find((one) => Math.abs(one - frame.speed) < 1e-3) ?? "");

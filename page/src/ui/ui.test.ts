@@ -62,10 +62,32 @@ it("begins the level that was chosen last when Enter is pressed", () => {
   giveCommand("forward");
   expect(asked("main")).toEqual(["choose", "start"]);
   expect(sent[0]).toEqual({ type: "choose", level: "ice" });
+  // It is still being loaded, and nobody is asked twice.
+  show({ frame: fakeFrame({ phase: "start" }) });
+  expect(text(".hero h2")).toBe("2. Thin ice");
+  expect(asked("main")).toEqual(["start"]);
+});
+
+it("keeps the focus on a card when the levels are told of anew", () => {
+  show({ frame: fakeFrame({ phase: "start" }) });
+  document.querySelector<HTMLElement>('[data-level="ice"]')?.focus();
+  show({ frame: fakeFrame({ phase: "start" }) });
+  expect(document.activeElement?.getAttribute("data-level")).toBe("ice");
+});
+
+it("shows the level that the server has when that was away before it had loaded another", () => {
+  show({ frame: fakeFrame({ phase: "start" }) });
+  giveCommand("forward");
+  giveCommand("main");
+  show({ frame: fakeFrame({ phase: "start" }), connection: "lost" });
+  expect(text(".hero h2")).toBe("1. Open floor");
+  expect(asked("main")).toEqual(["start"]);
 });
 
 it("keeps the start page while a level is loaded, and no other panel", () => {
   show({ frame: null, scene: null, level: null });
+  expect(shown(".start")).toBe(true);
+  show({ frame: null, scene: null });
   expect(shown(".start")).toBe(true);
   show({ frame: fakeFrame({ phase: "ended" }), result: RESULT });
   show({ frame: null, scene: null });
@@ -111,12 +133,6 @@ it("lights the next level only for who may go there", () => {
   show({ frame: fakeFrame({ phase: "ended", outcome: "finish" }), result });
   expect(text(".end-word")).toContain("3 left");
   expect(asked("main")).toEqual(["restart"]);
-});
-
-it("tells of an end even to who came after it", () => {
-  show({ frame: fakeFrame({ phase: "ended", outcome: "time limit", coins: 3, timeS: 60 }) });
-  expect(text(".end h2")).toBe("The time is up");
-  expect(text(".end .rows")).toContain("3 of 12");
 });
 
 it("shows who watches no button that steers", () => {

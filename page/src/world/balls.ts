@@ -64,14 +64,14 @@ export class Balls {
     this.ball = new Mesh(
       sphere,
       rich
-        ? new MeshStandardMaterial({ map: this.pattern, roughness: 0.28, envMapIntensity: 0.55 })
+        ? new MeshStandardMaterial({ map: this.pattern, roughness: 0.28 })
         : new SimpleMaterial([1, 1, 1], 1, 0.1, this.pattern),
     );
     this.ball.castShadow = true;
-    this.ghost = new Mesh(sphere, glassy("#cfe8ff", 0.42));
+    this.ghost = new Mesh(sphere, glassy("#d8ecff", 0.55));
     this.ghost.renderOrder = 2;
     const coarse = new SphereGeometry(radius, 20, 12);
-    this.crowd = new InstancedMesh(coarse, glassy("#ffffff", 0.5), MAX_CROWD);
+    this.crowd = new InstancedMesh(coarse, glassy("#ffffff", 0.4), MAX_CROWD);
     this.crowd.frustumCulled = false;
     this.crowd.count = 0;
     this.crowd.renderOrder = 2;

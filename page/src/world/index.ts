@@ -4,9 +4,11 @@ import {
   AmbientLight,
   DirectionalLight,
   HemisphereLight,
+  Matrix4,
   PCFShadowMap,
   PerspectiveCamera,
   PMREMGenerator,
+  Quaternion,
   Vector3,
   WebGLRenderer,
   type WebGLRenderTarget,
@@ -35,9 +37,17 @@ const LEAST_WIDTH_OF_VIEW = 60;
 const SUN = new Vector3(0.42, -0.3, -0.86).normalize();
 const TOWARDS_SUN = SUN.clone().negate();
 const SUN_DISTANCE_M = 30;
+/** From the frame of who looks from the sun, as its shadow's camera does, to the world's. */
+const FROM_SUN = new Quaternion().setFromRotationMatrix(
+  new Matrix4().lookAt(TOWARDS_SUN, new Vector3(), new Vector3(0, 1, 0)),
+);
+const TO_SUN = FROM_SUN.clone().invert();
 /** Half edge of the square round the ball in which the sun casts shadows. */
 const SHADOW_REACH_M = 14;
 const SHADOW_PIXELS = 2048;
+
+/** How much of the sky is reflected. */
+const ENVIRONMENT_SHARE = 0.45;
 
 /** With no graphics card more pictures a second would take the game its processor. */
 const SOFTWARE_FRAME_S = 1 / 31;
@@ -54,6 +64,7 @@ export class World {
   private readonly world = new World3();
   private readonly camera = new PerspectiveCamera(FIELD_OF_VIEW, 1, 0.1, 1000);
   private readonly sun = new DirectionalLight("#fff1dc", 2.5);
+  private readonly skyLight = new HemisphereLight("#e9f1ff", "#a8b4c4");
   private environment: WebGLRenderTarget | null = null;
   private readonly software: boolean;
   private readonly quality: Quality;
@@ -81,9 +92,8 @@ export class World {
     this.camera.up.set(0, 0, 1);
     this.setSun();
     this.world.add(skyMesh(paintSky(this.renderer, TOWARDS_SUN, false)));
-    const skyLight = new HemisphereLight("#cfe3ff", "#8fa3bd", 0.75);
-    skyLight.position.set(0, 0, 1);
-    this.world.add(this.sun, this.sun.target, skyLight, new AmbientLight("#ffffff", 0.35));
+    this.skyLight.position.set(0, 0, 1);
+    this.world.add(this.sun, this.sun.target, this.skyLight, new AmbientLight("#ffffff", 0.35));
     this.orbit = new OrbitCamera(
       canvas,
       () => {
@@ -104,6 +114,8 @@ export class World {
   /** Show another scene. */
   load(scene: Scene): void {
     this.scene = scene;
+    this.quality.retry();
+    this.resize();
     this.build(scene);
     this.game.reset();
     this.cutNext = true;
@@ -114,8 +126,7 @@ export class World {
   resize(): void {
     const width = Math.max(this.canvas.clientWidth, 1);
     const height = Math.max(this.canvas.clientHeight, 1);
-    const ratio = Math.min(this.quality.effort.pixelRatio, window.devicePixelRatio);
-    this.renderer.setPixelRatio(ratio);
+    this.renderer.setPixelRatio(this.quality.pixelRatio(width, height, window.devicePixelRatio));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     const least = Math.tan((LEAST_WIDTH_OF_VIEW * Math.PI) / 360) / this.camera.aspect;
@@ -159,7 +170,8 @@ export class World {
   /** Return whether a picture may be left out: the processor that would draw it is the game's, too. */
   private canWait(drawn: Drawn, frame: Frame, settings: Settings, elapsedS: number): boolean {
     if (elapsedS < SOFTWARE_FRAME_S) return true;
-    return frame === drawn.frame && settings === drawn.settings && settings.camera !== "orbit";
+    const isTurned = this.dragged || settings.camera === "orbit";
+    return frame === drawn.frame && settings === drawn.settings && !isTurned;
   }
 
   private look(frame: Frame, wanted: CameraChoice, elapsedS: number): CameraChoice {
@@ -196,14 +208,18 @@ export class World {
   private build(scene: Scene): void {
     this.parts?.dispose();
     const { rich } = this.quality.effort;
-    if (rich && this.environment === null) {
+    // Without a graphics card it takes ten seconds to get ready.
+    const reflects = rich && !this.software;
+    if (reflects && this.environment === null) {
       const sky = paintSky(this.renderer, TOWARDS_SUN, true);
       const generator = new PMREMGenerator(this.renderer);
       this.environment = generator.fromCubemap(sky.texture);
       generator.dispose();
       sky.dispose();
     }
-    this.world.environment = rich ? (this.environment?.texture ?? null) : null;
+    this.world.environmentIntensity = ENVIRONMENT_SHARE;
+    this.world.environment = reflects ? (this.environment?.texture ?? null) : null;
+    this.skyLight.intensity = reflects ? 1 : 1.7;
     this.renderer.shadowMap.enabled = rich;
     this.sun.castShadow = rich;
     const anisotropy = rich ? Math.min(this.renderer.capabilities.getMaxAnisotropy(), 8) : 1;
@@ -229,10 +245,13 @@ export class World {
   /** Let the sun cast its shadows round the ball. */
   private light(frame: Frame): void {
     const texel = (2 * SHADOW_REACH_M) / SHADOW_PIXELS;
-    // By whole texels, or edges of shadows would crawl.
-    const [x, y, z] = frame.ball.map((place) => Math.round(place / (8 * texel)) * 8 * texel);
-    this.sun.target.position.set(x ?? 0, y ?? 0, z ?? 0);
-    this.sun.position.copy(this.sun.target.position).addScaledVector(SUN, -SUN_DISTANCE_M);
+    const { position: middle } = this.sun.target;
+    // By whole texels as the sun sees them, or edges of shadows would crawl.
+    middle.set(...frame.ball).applyQuaternion(TO_SUN);
+    middle.x = Math.round(middle.x / texel) * texel;
+    middle.y = Math.round(middle.y / texel) * texel;
+    middle.applyQuaternion(FROM_SUN);
+    this.sun.position.copy(middle).addScaledVector(TOWARDS_SUN, SUN_DISTANCE_M);
   }
 }
 

@@ -40,7 +40,6 @@ const FLOOR_ROUGHNESS = 0.55;
 const EDGE_ROUGHNESS = 0.7;
 /** Glass shines a little, or it would look like smoke. */
 const GLASS = { roughness: 0.08, emission: 0.2 };
-const ENVIRONMENT_SHARE = 0.35;
 
 interface Look {
   colour: Rgb;
@@ -142,7 +141,6 @@ export class Paints {
       emissiveIntensity: emission,
       roughness,
       metalness,
-      envMapIntensity: ENVIRONMENT_SHARE,
       opacity: alpha,
       transparent: seenThrough,
       // What is behind glass is seen through both of its sides.

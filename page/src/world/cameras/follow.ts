@@ -9,10 +9,14 @@ const DISTANCE_M = 3.9;
 const PITCH = rad(30);
 
 /** Pitches tried in turn where a wall covers the ball: ever higher over it, at last below. */
+const HIGHEST = rad(80);
 const PITCHES = [30, 45, 62, 80, 12].map(rad);
 
 /** A pitch will do from which so much of the distance is free. */
 const FREE_ENOUGH = 0.75;
+
+/** How far below its middle the ball is still to be seen. */
+const FOOT_M = 0.28;
 
 /** What is kept between the camera and what it would else look through. */
 const MARGIN_M = 0.3;
@@ -28,6 +32,9 @@ const TURN_S = 0.55;
 const TURN_AT_REST_S = 0.9;
 const MOST_TURN_RAD_S = rad(170);
 
+/** Cosine of how far off the view the ball rolls when the camera stops turning after it. */
+const TURNS_NO_MORE = Math.cos(rad(110));
+
 /** Where the ball will be so soon is kept in the picture. */
 const AHEAD_S = 0.22;
 const MOST_AHEAD_M = 1.5;
@@ -35,19 +42,33 @@ const MOST_AHEAD_M = 1.5;
 const AHEAD_UPWARDS = 0.4;
 const AHEAD_EASE_S = 0.25;
 
-/** Rolling towards the camera, one sees more of the way from higher up. */
-const TOWARDS_PITCH = rad(24);
+/** Rolling towards the camera, one sees more of the way from higher up and further away. */
+const TOWARDS_PITCH = rad(28);
+const TOWARDS_DISTANCE_M = 1.8;
+
+/** In flight one looks down on where the ball will land, from further away: so much for a height,
+ * once it rises no faster than this; over nothing, once it falls. */
+const FLIGHT_PITCH = rad(42);
+const FLIGHT_DISTANCE_M = 2.5;
+const HIGH_M = 5;
+/** Of that height, what is no flight: the ball's own radius, and a hop. */
+const GROUNDED = 0.2;
+const RISES_M_S = 1.5;
+const FALLS_M_S = 2;
 
 const PITCH_EASE_S = 0.35;
+const PITCH_EASE_COVERED_S = 0.1;
 const OUT_EASE_S = 0.5;
 
 export class FollowCamera {
   private yaw = 0;
   private pitch = PITCH;
   private distance = DISTANCE_M;
+  private reach = DISTANCE_M;
   private restS = 0;
   private readonly ahead = new Vector3();
   private readonly ball = new Vector3();
+  private readonly foot = new Vector3();
   private readonly way = new Vector3();
   private readonly back = new Vector3();
 
@@ -72,14 +93,20 @@ export class FollowCamera {
    */
   look(frame: Frame, solids: Solids, elapsedS: number, eye: Eye): void {
     this.ball.set(...frame.ball);
+    this.foot.copy(this.ball).z -= FOOT_M;
     this.turn(frame, elapsedS);
     this.lookAhead(frame, elapsedS);
-    const wanted = this.clearPitch(frame, solids);
-    this.pitch += (wanted - this.pitch) * easing(elapsedS, PITCH_EASE_S);
-    const free = this.freeDistance(this.pitch, solids);
-    // In at once, since a wall is between; out gently.
-    if (free < this.distance) this.distance = free;
-    else this.distance += (free - this.distance) * easing(elapsedS, OUT_EASE_S);
+    const flight = this.flight(frame, solids);
+    const towards = this.towards(frame);
+    this.reach = DISTANCE_M + FLIGHT_DISTANCE_M * flight + TOWARDS_DISTANCE_M * towards;
+    const wanted = this.clearPitch(FLIGHT_PITCH * flight + TOWARDS_PITCH * towards, solids);
+    const free = this.freeDistance(this.ball, this.pitch, solids);
+    const pitchEaseS = free < FREE_ENOUGH * this.reach ? PITCH_EASE_COVERED_S : PITCH_EASE_S;
+    this.pitch += (wanted - this.pitch) * easing(elapsedS, pitchEaseS);
+    // In at once where a wall is between; out gently.
+    const room = this.freeDistance(this.ball, this.pitch, solids);
+    if (room < this.distance) this.distance = room;
+    else this.distance += (room - this.distance) * easing(elapsedS, OUT_EASE_S);
     eye.position.copy(this.ball).add(this.backwards(this.pitch).multiplyScalar(this.distance));
     eye.target.copy(this.ball).add(this.ahead);
   }
@@ -89,12 +116,13 @@ export class FollowCamera {
     const rolling = rolls(frame);
     this.restS = rolling ? 0 : this.restS + elapsedS;
     if (this.restS > 0 && this.restS < REST_S) return;
-    const error = wrapped((rolling ? Math.atan2(vy, vx) : 0) - this.yaw);
+    const error = (rolling ? Math.atan2(vy, vx) : 0) - this.yaw;
     const share = rolling
       ? easing(elapsedS, TURN_S) * Math.min(Math.hypot(vx, vy) / FULL_TURN_M_S, 1)
       : easing(elapsedS, TURN_AT_REST_S);
     const most = MOST_TURN_RAD_S * elapsedS;
-    this.yaw = wrapped(this.yaw + Math.min(Math.max(error * share, -most), most));
+    const turn = rolling ? sideways(error) : wrapped(error);
+    this.yaw = wrapped(this.yaw + Math.min(Math.max(turn * share, -most), most));
   }
 
   private lookAhead(frame: Frame, elapsedS: number): void {
@@ -104,27 +132,43 @@ export class FollowCamera {
     this.ahead.lerp(this.way, easing(elapsedS, AHEAD_EASE_S));
   }
 
-  /** Return the first pitch from which the ball is seen, or the one with the most room. */
-  private clearPitch(frame: Frame, solids: Solids): number {
+  /** Return how high the ball flies, 0 to 1, if where it lands is what matters. */
+  private flight(frame: Frame, solids: Solids): number {
+    const rise = frame.velocity[2];
+    const ground = solids.below(this.ball);
+    if (ground === null) return rise < -FALLS_M_S ? 1 : 0;
+    const height = this.ball.z - ground.height;
+    return rise < RISES_M_S ? Math.min(Math.max(height / HIGH_M - GROUNDED, 0), 1) : 0;
+  }
+
+  /** Return how fast the ball rolls towards the camera, 0 to 1. */
+  private towards(frame: Frame): number {
     const [vx, vy] = frame.velocity;
-    const speed = Math.hypot(vx, vy);
-    const towards = -(vx * Math.cos(this.yaw) + vy * Math.sin(this.yaw)) / Math.max(speed, 3);
-    const raised = TOWARDS_PITCH * Math.max(towards, 0);
+    const speed = -(vx * Math.cos(this.yaw) + vy * Math.sin(this.yaw));
+    return Math.min(Math.max(speed / FULL_TURN_M_S, 0), 1);
+  }
+
+  /** Return the first pitch from which the ball is seen, or the one with the most room. */
+  private clearPitch(raised: number, solids: Solids): number {
     let best = PITCH;
     let most = 0;
     for (const pitch of PITCHES) {
-      const tried = Math.min(pitch + raised, rad(80));
-      const free = this.freeDistance(tried, solids);
-      if (free >= FREE_ENOUGH * DISTANCE_M) return tried;
+      const tried = Math.min(pitch + raised, HIGHEST);
+      const free = Math.min(
+        this.freeDistance(this.ball, tried, solids),
+        this.freeDistance(this.foot, tried, solids),
+      );
+      if (free >= FREE_ENOUGH * this.reach) return tried;
       if (free > most) [best, most] = [tried, free];
     }
     return best;
   }
 
-  private freeDistance(pitch: number, solids: Solids): number {
-    const way = this.backwards(pitch).multiplyScalar(DISTANCE_M + MARGIN_M);
-    const free = solids.free(this.ball, way) * (DISTANCE_M + MARGIN_M) - MARGIN_M;
-    return Math.min(Math.max(free, NEAREST_M), DISTANCE_M);
+  /** Return how far from a point of the ball one may be to see it. */
+  private freeDistance(point: Vector3, pitch: number, solids: Solids): number {
+    const reach = this.reach + MARGIN_M;
+    const free = solids.free(point, this.backwards(pitch).multiplyScalar(reach));
+    return Math.min(Math.max(free * reach - MARGIN_M, NEAREST_M), this.reach);
   }
 
   /** Return the unit vector from the ball to the camera. */
@@ -137,6 +181,17 @@ export class FollowCamera {
 /** Return whether the ball rolls, and so has a way to look along. */
 function rolls({ velocity: [vx, vy] }: Frame): boolean {
   return Math.hypot(vx, vy) > REST_M_S;
+}
+
+/**
+ * Return by how much to turn to a way that is so far off, radians.
+ *
+ * It is the sideways share of the speed, and nothing once the ball rolls towards the camera: keys
+ * may be relative to the view, and who holds S would else steer in a circle.
+ */
+function sideways(error: number): number {
+  const towards = (Math.cos(error) - TURNS_NO_MORE) / -TURNS_NO_MORE;
+  return Math.sin(error) * Math.min(Math.max(towards, 0), 1);
 }
 
 function wrapped(angle: number): number {
