@@ -28,7 +28,6 @@ import tyro
 from tqdm import tqdm
 
 from roller_env.lab import baselines, baselines_page, chart, pages, trainings
-from roller_env.lab.runner import provenance
 
 NAME: Final = "baselines"
 RESULTS: Final = Path("docs/results")
@@ -103,9 +102,9 @@ class Tables:
 
 def tables(arguments: Tables) -> None:
     """Make the tables and charts of the page from the rows."""
-    told, charts = baselines_page.page(arguments.results)
+    told, charts, facts = baselines_page.page(arguments.results)
     for name, figure in charts.items():
-        chart.save(figure, provenance(), arguments.results / name)
+        chart.save(figure, facts, arguments.results / name)
     with TemporaryDirectory() as directory:
         measured = Path(directory) / "tables.md"
         measured.write_text(told, encoding="utf-8")

@@ -223,9 +223,9 @@ def draw_levels(rows: Frame) -> Figure:
         for row in own.itertuples(index=False):
             for column, beside in (("finish", -0.17), ("coins", 0.17)):
                 colour, at = _COLOURS[column], number + beside
-                face = "white" if row.is_cut else colour
-                value = getattr(row, column)
-                shares.plot(value, at, "o", ms=5, color=colour, mfc=face, alpha=0.7)
+                # A ring is seen round a disc that lies in the same place.
+                look = {"ms": 7, "mfc": "none"} if row.is_cut else {"ms": 4.5, "alpha": 0.7}
+                shares.plot(getattr(row, column), at, "o", color=colour, **look)
             has, cut = not np.isnan(row.reached_steps), row.is_cut
             x = (row.reached_steps if has else row.steps) / 1e6
             colour = chart.PREDICTION if has else "#999999" if cut else chart.FAILURE
@@ -241,9 +241,18 @@ def draw_levels(rows: Frame) -> Figure:
     return figure
 
 
-def page(results: Path) -> tuple[str, dict[str, Figure]]:
-    """Return the page's part that is measured, and its charts by their files' names."""
+def facts_of(rows: Frame) -> dict[str, str]:
+    """Return where the trainings were made, as charts tell it at their foot."""
+    told = rows.dropna(subset=["machine"])
+    names = ("date", "machine", "python", "roller", "mujoco", "torch", "numpy")
+    facts = {name: ", ".join(sorted(set(map(str, told[name])))) for name in names}
+    others = f"{len(rows) - len(told)} of {len(rows)} trainings are of seeds.csv"
+    return facts | ({"but": others} if len(told) < len(rows) else {})
+
+
+def page(results: Path) -> tuple[str, dict[str, Figure], dict[str, str]]:
+    """Return the page's part that is measured, its charts by name, and where it was measured."""
     rows = trainings_of(results)
     told = "\n".join([totals_table(rows), levels_table(rows), each_table(rows)])
     charts = {"baselines": draw_levels(rows), "baselines_curves": draw_curves(results, rows)}
-    return told, charts
+    return told, charts, facts_of(rows)

@@ -18,7 +18,7 @@ from roller_env.problems import shown
 from roller_env.simulation import Simulation
 from roller_env.training.files import RunError
 from roller_env.training.policy import TrainedPolicy, load_policy
-from roller_env.training.shipped import SHIPPED, run_of
+from roller_env.training.shipped import run_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,9 +49,6 @@ class Autopilot:
         """Make a player of a policy."""
         self.policy = policy
 
-    def meet(self, level: LevelSource) -> None:
-        """Nothing: it plays whatever level comes next."""
-
     def reset(self) -> None:
         """Nothing: it remembers nothing."""
 
@@ -78,18 +75,6 @@ class Autopilot:
         return shape_observation(simulation.config, simulation.entries, simulation.observe())
 
 
-class ShippedAutopilot(Autopilot):
-    """On each level the agent of it that comes with Roller."""
-
-    def meet(self, level: LevelSource) -> None:
-        """Let the agent of a level play from now on.
-
-        Raises:
-            RunError: none comes with Roller.
-        """
-        self.policy = load_policy(run_of(SHIPPED, level))
-
-
 def load_autopilot(
     run: Path,
     level: LevelSource | None = None,
@@ -101,7 +86,7 @@ def load_autopilot(
 
     Args:
         run: directory of the run, such as ``runs/ppo_classic-seed0``, or
-            `roller_env.training.shipped.SHIPPED`.
+            `roller_env.assets.SHIPPED`.
         level: what to play; by default what the agent was trained on.
         physics: likewise; by default the one of its evaluation.
         trust: see `load_policy`.
@@ -119,4 +104,4 @@ def load_autopilot(
         physics=physics_preset(physics or trained.physics),
         num_threads=1,
     )
-    return config, (ShippedAutopilot if run == SHIPPED else Autopilot)(policy)
+    return config, Autopilot(policy)

@@ -8,22 +8,19 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final
 
-from roller_env.assets import LEVELS, asset_directory
+from roller_env.assets import LEVELS, SHIPPED, asset_directory
 from roller_env.config import LevelSource
 from roller_env.problems import listed, quoted
 from roller_env.training.files import RunError
-
-SHIPPED: Final = Path("shipped")
-"""Stands where a run's directory is asked for; one of that name is written with its whole path."""
 
 DEFAULT_LEVEL: Final = "classic"
 
 
 def run_of(run: Path, level: LevelSource | None) -> Path:
-    """Return a run's directory: itself, or with `SHIPPED` that of the agent of a level.
+    """Return a run's directory: itself, or that of the agent of a level.
 
     Args:
-        run: directory, or `SHIPPED`.
+        run: directory, or `roller_env.assets.SHIPPED`.
         level: that is to be played; None for `DEFAULT_LEVEL`.
 
     Raises:

@@ -125,6 +125,7 @@ def test_the_best_agent_of_each_level_is_shipped(tmp_path: Path) -> None:
 
 
 def test_the_page_has_the_tables_of_the_rows_that_are_there() -> None:
-    told, charts = baselines_page.page(ROOT / "docs" / "results")
+    told, charts, facts = baselines_page.page(ROOT / "docs" / "results")
     assert told in (ROOT / "docs" / "baselines.md").read_text(encoding="utf-8")
     assert set(charts) == {"baselines", "baselines_curves"}
+    assert "Xeon" in facts["machine"]

@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 
+from roller_env.assets import SHIPPED
 from roller_env.training import load_policy
 from roller_env.training.run import evaluate_policy
-from roller_env.training.shipped import SHIPPED, run_of
+from roller_env.training.shipped import run_of
 
 PAGE = Path(__file__).parents[2] / "docs" / "baselines.md"
 

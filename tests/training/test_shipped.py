@@ -8,14 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from roller_env.assets import LEVELS
-from roller_env.cli import main
+from roller_env.assets import LEVELS, SHIPPED
+from roller_env.cli import main, play
 from roller_env.lab import baselines_page
-from roller_env.play.autopilot import load_autopilot
 from roller_env.training import load_policy
 from roller_env.training.files import RunError
 from roller_env.training.run import evaluate_policy
-from roller_env.training.shipped import SHIPPED, run_of
+from roller_env.training.shipped import run_of
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 
@@ -48,10 +47,21 @@ def test_a_level_of_ones_own_has_no_agent() -> None:
 
 
 def test_a_page_that_goes_to_another_level_gets_the_agent_of_that_level() -> None:
-    config, autopilot = load_autopilot(SHIPPED, "flat")
-    assert (config.level, autopilot.policy.config.level) == ("flat", "flat")
-    autopilot.meet("wind")
-    assert autopilot.policy.config.level == "wind"
+    arguments = play.Arguments(level="flat", policy=SHIPPED, agents=3)
+    config, agent = play.game_of(arguments)
+    crowd = play.crowd_of(agent, arguments)
+    assert agent is not None
+    assert crowd is not None
+    shipped = play.those_shipped(agent, crowd, arguments)
+    open_game = play.game_opener(config, agent, arguments, shipped)
+    for level in ("flat", "wind"):
+        game = open_game(level, (crowd,))
+        assert agent.policy.config.level == crowd.policy.config.level == level
+        game.warm_up()
+        game.start()
+        game.skip_intro()
+        game.advance(0.1, "")
+        assert game.simulation.time_s[0] > 0.0
 
 
 def test_they_are_evaluated_by_the_name_of_their_level(capsys: pytest.CaptureFixture[str]) -> None:
