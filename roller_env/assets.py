@@ -41,8 +41,8 @@ LEVELS: Final = (
 """The levels, from the easy ones to the hard ones, as people find them."""
 
 SHIPPED: Final = Path("shipped")
-"""Where a run's directory is asked for: the agent of the level that comes with Roller. A run of that
-name is written with its whole path."""
+"""Where a run's directory is asked for: the agent of the level that comes with Roller. A run of
+that name is written with its whole path."""
 
 _IN_A_CHECKOUT: Final[dict[Kind, str]] = {
     "levels": "assets/levels",

@@ -10,6 +10,7 @@ from typing import Final
 
 from roller_env.assets import LEVELS, SHIPPED, asset_directory
 from roller_env.config import LevelSource
+from roller_env.level import Level
 from roller_env.problems import listed, quoted
 from roller_env.training.files import RunError
 
@@ -30,6 +31,6 @@ def run_of(run: Path, level: LevelSource | None) -> Path:
         return run
     level = level or DEFAULT_LEVEL
     if level not in LEVELS:
-        found = quoted(level if isinstance(level, str) else level.name)
+        found = quoted(level.name if isinstance(level, Level) else str(level))
         raise RunError(f"shipped: no agent of {found} comes with Roller; of {listed(LEVELS)} do")
     return asset_directory("policies") / str(level)
