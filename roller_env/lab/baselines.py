@@ -6,15 +6,17 @@ Their rows are trainings' (`roller_env.lab.trainings`). The five oldest levels h
 
 from __future__ import annotations
 
+import json
 import tarfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from roller_env.assets import LEVELS
 from roller_env.lab import trainings
 from roller_env.lab.table import Frame
 from roller_env.lab.trainings import RECIPE, Experiment, Trial
+from roller_env.training.files import RunFiles
 
 SEEDS: Final = range(50, 55)
 """Nobody tuned on them."""
@@ -55,26 +57,36 @@ def compile_once(recipe: Path, stem: Path) -> None:
 def ship(rows: Frame, policies: Path, out: Path) -> Iterator[str]:
     """Write the best agent of each level, and say which: by finished games times coins.
 
+    One that is there already stays unless another is better.
+
     Args:
         rows: trainings, with ``is_cut``; those that were cut off are not shipped.
         policies: tar file with ``LEVEL-SEED/policy.json`` and ``.safetensors``.
         out: directory of a directory a level.
     """
     with tarfile.open(policies) as archive:
-        kept = {Path(name).parent.name for name in archive.getnames()}
+        kept = set(archive.getnames())
         for level in LEVELS:
-            row = max(
-                (row for row in _rows_of(rows, level) if f"{level}-{row.seed}" in kept),
-                key=lambda row: (row.finish * row.coins, row.coins, -row.seed),
-            )
-            directory = out / level
-            directory.mkdir(parents=True, exist_ok=True)
-            for part in ("policy.json", "policy.safetensors"):
-                content = archive.extractfile(f"{level}-{row.seed}/{part}")
-                assert content is not None
-                (directory / part).write_bytes(content.read())
-            yield f"{level}: seed {row.seed}, {row.finish:.0%} at the finish, {row.coins:.1%} coins"
+            files = RunFiles(out / level)
+            shipped = _seed_of(files.policy)
+            own = [
+                row
+                for row in rows[(rows.level == level) & ~rows.is_cut].itertuples(index=False)
+                if row.seed == shipped or f"{level}-{row.seed}/{files.policy.name}" in kept
+            ]
+            best = max(own, key=lambda row: (row.finish * row.coins, row.coins, -row.seed))
+            if best.seed != shipped:
+                files.directory.mkdir(parents=True, exist_ok=True)
+                for file in (files.policy, files.weights):
+                    content = archive.extractfile(f"{level}-{best.seed}/{file.name}")
+                    assert content is not None
+                    file.write_bytes(content.read())
+            shares = f"{best.finish:.0%} at the finish, {best.coins:.1%} coins"
+            yield f"{level}: seed {best.seed}, {shares}"
 
 
-def _rows_of(rows: Frame, level: str) -> Iterator[Any]:
-    yield from rows[(rows.level == level) & ~rows.is_cut].itertuples(index=False)
+def _seed_of(policy: Path) -> int | None:
+    """Return the seed of an agent's training, if there is an agent."""
+    if not policy.exists():
+        return None
+    return int(json.loads(policy.read_text(encoding="utf-8"))["training"]["seed"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import inspect
 import json
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -13,6 +14,7 @@ from gymnasium.envs.registration import load_env_creator, registry
 
 from roller_env.lab import fingerprints
 from roller_env.level import load_level
+from scripts import fingerprints as command
 
 REMEDY = "python scripts/fingerprints.py says what to do"
 
@@ -51,6 +53,25 @@ def test_a_change_is_told_by_the_name_of_what_has_changed(known: dict[str, Any])
     assert told[1].startswith("ids, Roller/Ice-v0, level: ")
     assert told[2].startswith("ids, Roller/Lava-v0: ")
     assert told[2].endswith(" before, nothing now")
+
+
+def test_the_command_keeps_new_ids_and_refuses_a_known_one_that_changed(
+    known: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, before = tmp_path / "fingerprints.json", copy.deepcopy(known)
+    del before["ids"]["Roller/Lava-v0"]
+    file.write_text(json.dumps(before))
+    monkeypatch.setattr(fingerprints, "fingerprints", lambda: known)
+    command.main(command.Arguments(file=file))
+    assert json.loads(file.read_text()) == known
+    changed = copy.deepcopy(known)
+    changed["ids"]["Roller/Ice-v0"]["level"] = "other"
+    monkeypatch.setattr(fingerprints, "fingerprints", lambda: changed)
+    with pytest.raises(SystemExit, match=r"^ids, Roller/Ice-v0, level: .*\n\nbump the version: "):
+        command.main(command.Arguments(file=file))
+    assert json.loads(file.read_text()) == known
+    command.main(command.Arguments(file=file, unreleased=True))
+    assert json.loads(file.read_text()) == changed
 
 
 def test_every_version_of_every_id_is_in_the_history_of_its_class() -> None:

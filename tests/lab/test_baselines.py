@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tarfile
 from pathlib import Path
 from typing import Any
@@ -107,21 +108,30 @@ def test_totals_are_of_full_matrices_only(tmp_path: Path) -> None:
     assert every_seed.startswith("| 1 | 50 to 54 | 1 of 5 | 50 % [50 %, ")
 
 
-def test_the_best_agent_of_each_level_is_shipped(tmp_path: Path) -> None:
-    rows = [trained(level, finish=0.0) for level in LEVELS]
-    rows += [trained("flat", 51), trained("flat", 52), trained("ice", 51, ended=UNFINISHED)]
-    made = in_files(tmp_path, rows, curve_of(1.0))
-    archive = tmp_path / "policies.tar"
+def ship(directory: Path, rows: list[dict[str, Any]], kept: list[dict[str, Any]]) -> list[str]:
+    """Ship from an archive of agents, and return what is shipped of each level."""
+    archive, out = directory / "policies.tar", directory / "out"
     with tarfile.open(archive, "w") as tar:
-        for row in rows:
+        for row in kept:
             for part in ("policy.json", "policy.safetensors"):
-                file = tmp_path / part
-                file.write_text(f"{row['level']} {row['seed']}")
+                file = directory / part
+                file.write_text(json.dumps({"training": {"seed": row["seed"]}}))
                 tar.add(file, f"{row['level']}-{row['seed']}/{part}")
-    said = list(baselines.ship(made, archive, tmp_path / "out"))
-    assert said[0] == "flat: seed 51, 100% at the finish, 100.0% coins"
-    assert (tmp_path / "out" / "flat" / "policy.safetensors").read_text() == "flat 51"
-    assert (tmp_path / "out" / "ice" / "policy.json").read_text() == "ice 50"
+    list(baselines.ship(in_files(directory, rows, curve_of(1.0)), archive, out))
+    return [(out / level / "policy.safetensors").read_text() for level in LEVELS]
+
+
+def test_the_best_agent_of_each_level_is_shipped_and_stays_while_it_is_the_best(
+    tmp_path: Path,
+) -> None:
+    rows = [trained(level, finish=0.5) for level in LEVELS]
+    rows += [trained("flat", 52), trained("flat", 51), trained("ice", 51, ended=UNFINISHED)]
+    first, last = '{"training": {"seed": 50}}', '{"training": {"seed": 54}}'
+    found = dict(zip(LEVELS, ship(tmp_path, rows, rows), strict=True))
+    assert found == dict.fromkeys(LEVELS, first) | {"flat": first.replace("50", "51")}
+    more = [trained("flat", 54), trained("ice", 54), trained("lava", 54, finish=0.4)]
+    later = dict(zip(LEVELS, ship(tmp_path, rows + more, more), strict=True))
+    assert later == found | {"ice": last}
 
 
 def test_the_page_has_the_tables_of_the_rows_that_are_there() -> None:
