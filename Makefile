@@ -14,13 +14,15 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 # Other environments, to be measured beside this one; never mixed with what Roller needs.
 PEERS  := .venv-peers
+# Ray, which pins another Gymnasium.
+CLUSTER := .venv-cluster
 # One environment for each supported Python.
 MATRIX := .venv-matrix
 # Newer than both files it depends on exactly when the environment is complete.
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup train play test coverage matrix lint format page docs benchmark clean
+.PHONY: help setup train play test coverage matrix cluster lint format page docs benchmark clean
 .DELETE_ON_ERROR:
 
 help: ## show this list
@@ -63,6 +65,19 @@ coverage: $(READY) ## run the tests, and say which lines of the package they lea
 matrix: $(READY) ## try the wheel with every supported Python found here, and the oldest Gymnasium
 	@$(BIN)/python scripts/matrix.py
 
+cluster: $(CLUSTER)/.ready ## train on two Ray nodes of this machine, that come and go
+	@$(CLUSTER)/bin/python scripts/cluster.py $(ARGS)
+
+$(CLUSTER)/.ready: pyproject.toml constraints.txt
+	@echo "Installing Ray and Roller into $(CLUSTER) (once) ..."
+	@test -x $(CLUSTER)/bin/python || $(PYTHON) -m venv $(CLUSTER)
+	@grep -v '^gymnasium==' constraints.txt > $(CLUSTER)/constraints.txt
+	@$(CLUSTER)/bin/python -m pip install --quiet --disable-pip-version-check --no-input \
+		--constraint $(CLUSTER)/constraints.txt hatchling editables
+	@$(CLUSTER)/bin/python -m pip install --quiet --disable-pip-version-check --no-input \
+		--constraint $(CLUSTER)/constraints.txt --no-build-isolation --editable '.[train,cluster]'
+	@touch $@
+
 lint: $(READY) ## check style, types and the direction of imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -90,5 +105,5 @@ $(PEERS)/.ready: scripts/benchmark-peers.txt
 	@touch $@
 
 clean: ## remove the environments and caches; runs/ stays
-	rm -rf $(VENV) page/node_modules $(PEERS) $(MATRIX) build dist site .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) page/node_modules $(PEERS) $(CLUSTER) $(MATRIX) build dist site .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
