@@ -32,7 +32,7 @@ FILE: Final = Path(__file__).parents[2] / "tests" / "envs" / "fingerprints.json"
 """Where they are kept, in a checkout."""
 
 GAME_S: Final = 4.0
-"""Most of a game that is looked at: after twice as much, another processor's last digit shows."""
+"""Most of a game that is looked at: after twice as much, 1e-13 m at the start show in `rails`."""
 
 ALIKE: Final = 1e-6
 """Relative difference of two numbers from which on they are of different games."""
