@@ -12,7 +12,9 @@ from typing import Final, Literal
 
 from roller_env.problems import listed
 
-Kind = Literal["levels", "replays", "sounds", "pictures", "page", "generated", "configs"]
+Kind = Literal[
+    "levels", "replays", "sounds", "pictures", "page", "generated", "configs", "policies"
+]
 
 LEVELS: Final = (
     "flat",
@@ -38,6 +40,10 @@ LEVELS: Final = (
 )
 """The levels, from the easy ones to the hard ones, as people find them."""
 
+SHIPPED: Final = Path("shipped")
+"""Where a run's directory is asked for: the agent of the level that comes with Roller. A run of
+that name is written with its whole path."""
+
 _IN_A_CHECKOUT: Final[dict[Kind, str]] = {
     "levels": "assets/levels",
     "replays": "assets/replays",
@@ -46,6 +52,7 @@ _IN_A_CHECKOUT: Final[dict[Kind, str]] = {
     "page": "assets/page",
     "generated": "assets/generated",
     "configs": "configs",
+    "policies": "assets/policies",
 }
 
 

@@ -79,6 +79,9 @@ def test_the_wheel_holds_every_level_and_replay_and_says_that_it_is_typed(wheel:
     assert "roller_env/py.typed" in names
     assert {f"roller_env/assets/levels/{level}.yaml" for level in shipped_levels()} <= names
     assert {f"roller_env/assets/replays/{level}.replay" for level in shipped_replays()} <= names
+    for level in shipped_levels():
+        policy = f"roller_env/assets/policies/{level}/policy"
+        assert {f"{policy}.json", f"{policy}.safetensors"} <= names
     assert "roller_env/assets/configs/ppo.yaml" in names
     assert "roller_env/assets/sounds/coin.wav" in names
     only_here = ("tests/", "scripts/", "configs/", "roller_env/lab/")

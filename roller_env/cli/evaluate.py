@@ -4,6 +4,7 @@ Examples::
 
     roller evaluate runs/ppo_classic-seed0
     roller evaluate runs/ppo_classic-seed0 --episodes 1000 --seed 7 --output evaluations/
+    roller evaluate shipped --level gate
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from roller_env.training.files import RunError, RunFiles
 from roller_env.training.pictures import draw_paths, film_episode
 from roller_env.training.report import markdown_table, write_evaluation
 from roller_env.training.run import evaluate_policy, player_of
+from roller_env.training.shipped import run_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +33,10 @@ class Arguments:
     """Play a trained agent and print its evaluation table."""
 
     run: Annotated[Path, tyro.conf.Positional]
-    """Directory of the run."""
+    """Directory of the run; or shipped: the agent of the level that comes with Roller."""
 
     level: str | None = None
-    """Name or path of another level than the one trained on."""
+    """Name or path of another level than the one trained on; of shipped agents, which one."""
 
     episodes: int = 100
     """How many to play."""
@@ -69,13 +71,14 @@ def main(argv: Sequence[str] | None = None, prog: str | None = None) -> None:
 
 
 def _evaluate(arguments: Arguments) -> None:
-    policy = load_policy(arguments.run, trust=arguments.trust)
+    run = run_of(arguments.run, arguments.level)
+    policy = load_policy(run, trust=arguments.trust)
     config = policy.config
     if arguments.level is not None:
         config = config.on_level(arguments.level)
     with reports_in(arguments.output or arguments.run):
         evaluation = evaluate_policy(
-            policy, config, arguments.episodes, arguments.seed, player_of(arguments.run)
+            policy, config, arguments.episodes, arguments.seed, player_of(run)
         )
     print(markdown_table(evaluation, config))
     if arguments.replays is not None:

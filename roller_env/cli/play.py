@@ -5,6 +5,7 @@ Examples::
     roller play
     roller play bridge --skip-intro
     roller play --policy runs/ppo_classic-seed0
+    roller play gate --policy shipped
     roller play --policy runs/ppo_classic-seed0 --agents 64
     roller play classic --against runs/ppo_classic-seed0
     roller play my_level.yaml --physics accurate
@@ -21,6 +22,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import tyro
 
+from roller_env.assets import SHIPPED
 from roller_env.config import EnvConfig
 from roller_env.platforms import ENDING_SIGNALS
 from roller_env.play.offers import offers_of
@@ -69,11 +71,12 @@ class Arguments:
     """Of the first game; by default another one every time."""
 
     policy: Path | None = None
-    """A run's directory: its agent plays until you press a key."""
+    """A run's directory, or shipped, for the one of each level that comes with Roller: its agent
+    plays until you press a key."""
 
     against: Path | None = None
-    """A run's directory: balls of its agent play beside the game; by default, with --agents, those
-    of --policy."""
+    """A run's directory, or shipped: balls of its agent play beside the game; by default, with
+    --agents, those of --policy."""
 
     agents: int | None = None
     """How many balls play beside the game, up to 256; by default one, with --against."""
@@ -126,10 +129,12 @@ def play(arguments: Arguments) -> int:
     records = Records(arguments.records or default_file())
     crowd = crowd_of(agent, arguments)
     offers = offers_of(config.level)
-    for policy in [each.policy for each in (agent, crowd) if each is not None]:
-        offers = [offer for offer in offers if policy.plays(offer.level)]
+    shipped = those_shipped(agent, crowd, arguments)
+    for each in (agent, crowd):
+        if each is not None and each not in shipped:
+            offers = [offer for offer in offers if each.policy.plays(offer.level)]
     room = Room(
-        game_opener(config, agent, arguments),
+        game_opener(config, agent, arguments, shipped),
         offers,
         str(config.level),
         keeper=keeper,
@@ -191,9 +196,11 @@ def crowd_of(agent: Autopilot | None, arguments: Arguments) -> Crowd | None:
     # Imported here: it takes torch, which a person's game does not need.
     from roller_env.play.crowd import Crowd
     from roller_env.training.policy import load_policy
+    from roller_env.training.shipped import run_of
 
     if arguments.against is not None:
-        policy = load_policy(arguments.against, trust=arguments.trust)
+        run = run_of(arguments.against, arguments.level)
+        policy = load_policy(run, trust=arguments.trust)
     elif agent is not None:
         policy = agent.policy
     else:
@@ -201,12 +208,28 @@ def crowd_of(agent: Autopilot | None, arguments: Arguments) -> Crowd | None:
     return Crowd(policy, 1 if arguments.agents is None else arguments.agents)
 
 
+def those_shipped(
+    agent: Autopilot | None, crowd: Crowd | None, arguments: Arguments
+) -> list[Autopilot | Crowd]:
+    """Return which of the players are, on each level, the agent of it that comes with Roller."""
+    runs = ((agent, arguments.policy), (crowd, arguments.against or arguments.policy))
+    return [each for each, run in runs if each is not None and run == SHIPPED]
+
+
 def game_opener(
-    config: EnvConfig, agent: Autopilot | None, arguments: Arguments
+    config: EnvConfig,
+    agent: Autopilot | None,
+    arguments: Arguments,
+    shipped: Sequence[Autopilot | Crowd] = (),
 ) -> Callable[[str, Sequence[Observer]], GameSession]:
-    """Return what makes the game of a level."""
+    """Return what makes the game of a level, and lets its own agents play if they are shipped."""
 
     def open_game(level: str, observers: Sequence[Observer]) -> GameSession:
+        for each in shipped:
+            from roller_env.training.policy import load_policy
+            from roller_env.training.shipped import run_of
+
+            each.policy = load_policy(run_of(SHIPPED, level))
         return GameSession(
             replace(config, level=level),
             skip_intro=arguments.skip_intro,

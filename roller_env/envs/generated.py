@@ -18,7 +18,11 @@ DIFFICULTY: Final = 0.25
 
 
 class GeneratedEnv(RollerEnv):
-    """A game on generated levels, each proved winnable: ``Roller/Generated-v0``."""
+    """A game on generated levels, each proved winnable: ``Roller/Generated-v0``.
+
+    Version history:
+        v0: the first version.
+    """
 
     def __init__(
         self,
@@ -47,7 +51,11 @@ class GeneratedEnv(RollerEnv):
 
 
 class GeneratedVectorEnv(RollerVectorEnv):
-    """N games on generated levels; see `GeneratedEnv`."""
+    """N games on generated levels; see `GeneratedEnv`.
+
+    Version history:
+        v0: the first version.
+    """
 
     def __init__(
         self,

@@ -38,7 +38,7 @@ class RollerEnv(gym.Env[Any, Any]):
     not copied; the copy makes its own.
 
     Version history:
-        v0: first version.
+        v0: of every id, the first version. docs/baselines.md says what makes the next one.
     """
 
     # Gymnasium reads the class's before an environment is made, and writes none.

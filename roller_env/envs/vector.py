@@ -37,6 +37,9 @@ class RollerVectorEnv(gym.vector.VectorEnv[Any, Any, Any]):
     ``reset(options={"reset_mask": mask})``.
 
     Infos are those of `RollerEnv`, as arrays of (N,). Like that it can be copied and pickled.
+
+    Version history:
+        v0: of every id, the first version; as `RollerEnv`'s.
     """
 
     # Before Gymnasium 1.3 its __del__ closes also what its options kept from being made.

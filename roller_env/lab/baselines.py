@@ -6,12 +6,17 @@ Their rows are trainings' (`roller_env.lab.trainings`). The five oldest levels h
 
 from __future__ import annotations
 
+import json
+import tarfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
 from roller_env.assets import LEVELS
 from roller_env.lab import trainings
+from roller_env.lab.table import Frame
 from roller_env.lab.trainings import RECIPE, Experiment, Trial
+from roller_env.training.files import RunFiles
 
 SEEDS: Final = range(50, 55)
 """Nobody tuned on them."""
@@ -47,3 +52,41 @@ def compile_once(recipe: Path, stem: Path) -> None:
         trainings.QUICK.trials[:1], (*trainings.QUICK.changes, *EXPERIMENT.changes[1:])
     )
     trainings.run(first, recipe, stem, jobs=1)
+
+
+def ship(rows: Frame, policies: Path, out: Path) -> Iterator[str]:
+    """Write the best agent of each level, and say which: by finished games times coins.
+
+    One that is there already stays unless another is better.
+
+    Args:
+        rows: trainings, with ``is_cut``; those that were cut off are not shipped.
+        policies: tar file with ``LEVEL-SEED/policy.json`` and ``.safetensors``.
+        out: directory of a directory a level.
+    """
+    with tarfile.open(policies) as archive:
+        kept = set(archive.getnames())
+        for level in LEVELS:
+            files = RunFiles(out / level)
+            shipped = _seed_of(files.policy)
+            own = [
+                row
+                for row in rows[(rows.level == level) & ~rows.is_cut].itertuples(index=False)
+                if row.seed == shipped or f"{level}-{row.seed}/{files.policy.name}" in kept
+            ]
+            best = max(own, key=lambda row: (row.finish * row.coins, row.coins, -row.seed))
+            if best.seed != shipped:
+                files.directory.mkdir(parents=True, exist_ok=True)
+                for file in (files.policy, files.weights):
+                    content = archive.extractfile(f"{level}-{best.seed}/{file.name}")
+                    assert content is not None
+                    file.write_bytes(content.read())
+            shares = f"{best.finish:.0%} at the finish, {best.coins:.1%} coins"
+            yield f"{level}: seed {best.seed}, {shares}"
+
+
+def _seed_of(policy: Path) -> int | None:
+    """Return the seed of an agent's training, if there is an agent."""
+    if not policy.exists():
+        return None
+    return int(json.loads(policy.read_text(encoding="utf-8"))["training"]["seed"])

@@ -18,6 +18,7 @@ from roller_env.problems import shown
 from roller_env.simulation import Simulation
 from roller_env.training.files import RunError
 from roller_env.training.policy import TrainedPolicy, load_policy
+from roller_env.training.shipped import run_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +85,8 @@ def load_autopilot(
     """Return the options of a game that a run's agent can play, and the agent.
 
     Args:
-        run: directory of the run, such as ``runs/ppo_classic-seed0``.
+        run: directory of the run, such as ``runs/ppo_classic-seed0``, or
+            `roller_env.assets.SHIPPED`.
         level: what to play; by default what the agent was trained on.
         physics: likewise; by default the one of its evaluation.
         trust: see `load_policy`.
@@ -92,7 +94,7 @@ def load_autopilot(
     Raises:
         RunError: not a run, or an agent that needs pictures.
     """
-    policy: TrainedPolicy = load_policy(run, trust=trust)
+    policy: TrainedPolicy = load_policy(run_of(run, level), trust=trust)
     trained = policy.config.evaluation_environment
     if trained.observation == "pixels":
         raise RunError(f"{shown(run)}: its agent looks at pictures, which a page does not give it")
