@@ -41,13 +41,14 @@ _RIDING_M: Final = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """The T moments of a play, before each control step and at the end.
+    """The T moments of a play, before each control step, and the middle of the finish behind them.
 
     Attributes:
         place: (T, 3) metres, world frame.
         velocity: (T, 3) m/s, world frame.
         displacement: (T, P) of the platforms, metres.
         ridden: (T, P) whether the ball rides each.
+        coins: (T,) how many are collected.
         push: (9, 2) acceleration of a rolling ball by each of `DIRECTIONS`, m/s^2.
     """
 
@@ -55,6 +56,7 @@ class Reference:
     velocity: Float64
     displacement: Float64
     ridden: Bool
+    coins: Int64
     push: Float64
 
     @staticmethod
@@ -73,20 +75,23 @@ class Reference:
         for force in [None, *replay.force_n]:
             if force is not None:
                 simulation.step(force[None])
-            ridden = platforms.ridden(simulation, ball.radius + _RIDING_M)
+            which = platforms.ridden(simulation, ball.radius + _RIDING_M)
             moments.append(
                 (
                     simulation.ball_position[0],
                     simulation.ball_velocity[0],
                     platforms.displacement(simulation)[0],
-                    ridden[0] == np.arange(len(platforms)),
+                    which[0] == np.arange(len(platforms)),
+                    simulation.state.coins[0],
                 )
             )
         push = forces("directions", np.arange(len(DIRECTIONS))) / (_ROLLING * ball.mass_kg)
-        place, velocity, displacement, riding = (
+        finish = np.array([*simulation.level.finish.at[:2], moments[-1][0][2]])
+        moments.append((finish, np.zeros(3), *moments[-1][2:]))
+        place, velocity, displacement, ridden, coins = (
             np.array(each) for each in zip(*moments, strict=True)
         )
-        return Reference(place, velocity, displacement, riding, push)
+        return Reference(place, velocity, displacement, ridden, coins, push)
 
     def __len__(self) -> int:
         """Return the number of moments, T."""

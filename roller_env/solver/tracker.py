@@ -10,6 +10,7 @@ ferry, and comes to a spring as fast as the landing needs.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from typing import Final
 
@@ -22,14 +23,14 @@ from roller_env.solver.platforms import Platforms
 from roller_env.solver.reference import Reference
 from roller_env.solver.search import solver_config
 
-_LOOK: Final = 20
+_LOOK: Final = 25
 """Control steps that the model goes on for."""
 
 _EVERY: Final = 2
 """Control steps after which it is asked again."""
 
-_HOLD: Final = 4
-"""Control steps for which it tries a direction."""
+_LENGTHS: Final = (4, 8, 2, 12)
+"""Control steps for which it tries directions, in turn."""
 
 _BEHIND: Final = 10
 """Moments of the play by which it may end short of what the play does in that time."""
@@ -39,6 +40,9 @@ _OFF_M: Final = 0.5
 
 _PROGRESS_M: Final = 0.1
 """Distance from the play that a moment of it is worth."""
+
+_COIN_M: Final = 1.5
+"""And what a coin of the play is worth that is collected, too."""
 
 _LOST: Final = 1e6
 _WON: Final = -1e6
@@ -56,9 +60,10 @@ class Tracker:
         """
         self._reference, self._simulation = reference, simulation
         self._platforms = Platforms.of(simulation)
-        self._moment = np.zeros(simulation.num_envs, dtype=np.int64)
+        self._moment, self._direction, self._held = np.zeros((3, simulation.num_envs), np.int64)
+        self._lengths = itertools.cycle(_LENGTHS)
         self._model = Simulation(
-            solver_config(simulation.level), simulation.num_envs * len(DIRECTIONS)
+            solver_config(simulation.level), simulation.num_envs * (len(DIRECTIONS) + 1)
         )
         self._model.reset()
         self._blank = self._model.snapshot()
@@ -78,21 +83,29 @@ class Tracker:
             simulation.step(forces("directions", actions))
 
     def _planned(self, rows: Int64) -> Int64:
-        """Return what to hold in rows in each of the next steps, (`_EVERY`, n)."""
+        """Return what to hold in rows in each of the next steps, (`_EVERY`, n).
+
+        A plan is a direction, and for how many steps it is held before the law is followed. A game
+        keeps its plan until it looks bad and another looks better.
+        """
         games, moment = self._modelled(rows), self._moment[rows]
-        plan, cost = self._tried(games, moment, None)
+        direction, held = self._direction[rows], self._held[rows]
+        actions, cost = self._tried(games, moment, direction, held)
         doubtful = np.flatnonzero(cost > _OFF_M - _PROGRESS_M * self._expected(moment))
         if len(doubtful):
-            count = len(DIRECTIONS)
+            count = len(DIRECTIONS) + 1
             each = np.repeat(doubtful, count)
-            tried = np.tile(np.arange(count), len(doubtful))
-            others, costs = self._tried(games.take(each), moment[each], tried)
-            # Where no other is better, it goes on as the law says.
-            costs = costs.reshape(-1, count)
-            best = costs.argmin(axis=1)
-            better = np.flatnonzero(costs.min(axis=1) < cost[doubtful])
-            plan[:, doubtful[better]] = others[:, better * count + best[better]]
-        return plan
+            directions = np.tile(np.arange(count) % len(DIRECTIONS), len(doubtful))
+            # The last of them is the law alone.
+            lengths = np.tile(np.append(np.full(count - 1, next(self._lengths)), 0), len(doubtful))
+            others, costs = self._tried(games.take(each), moment[each], directions, lengths)
+            best = costs.reshape(-1, count).argmin(axis=1) + count * np.arange(len(doubtful))
+            better = costs[best] < cost[doubtful]
+            best, mended = best[better], doubtful[better]
+            actions[:, mended] = others[:, best]
+            direction[mended], held[mended] = directions[best], lengths[best]
+        self._direction[rows], self._held[rows] = direction, np.maximum(held - _EVERY, 0)
+        return actions
 
     def _expected(self, moment: Int64) -> Int64:
         """Return the moment that a game ends at, at least, if it is followed well."""
@@ -107,31 +120,40 @@ class Tracker:
             getattr(games.bodies, name)[:] = getattr(now.bodies, name)
         return games
 
-    def _tried(self, games: Snapshot, moment: Int64, first: Int64 | None) -> tuple[Int64, Float64]:
-        """Return what n games held in their first steps, (`_EVERY`, n), and the costs, (n,) metres.
+    def _tried(
+        self, games: Snapshot, moment: Int64, direction: Int64, held: Int64
+    ) -> tuple[Int64, Float64]:
+        """Return what n games hold in their first steps, (`_EVERY`, n), and the costs, (n,) metres.
 
         Args:
             games: to go on from.
             moment: (n,) of the play that they are at.
-            first: (n,) what to hold at first; None: what the law says.
+            direction: (n,) what to hold at first, indices of `DIRECTIONS`.
+            held: (n,) for how many steps; then the law is followed.
         """
-        model, count, at = self._model, len(games), moment
+        model, count = self._model, len(games)
         model.restore(games)
         hold = np.arange(model.num_envs) >= count
         actions = np.zeros((_LOOK, model.num_envs), dtype=np.int64)
-        won = np.zeros(count, dtype=np.int64)
+        won, missed = np.zeros(count, dtype=np.int64), self._missed(model, moment)
         for step in range(_LOOK):
-            at = self._nearest(model, at)
-            actions[step, :count] = self._steered(model, at) if first is None else first
-            if step >= _HOLD - 1:
-                first = None
+            moment = self._nearest(model, moment)
+            followed = self._steered(model, moment)
+            actions[step, :count] = np.where(step < held, direction, followed)
             model.step(forces("directions", actions[step]), hold)
             won += model.state.finished[:count]
-        at = self._nearest(model, at)
-        cost = self._off(model, at) - _PROGRESS_M * at
+        moment = self._nearest(model, moment)
+        cost = self._off(model, moment) - _PROGRESS_M * moment
+        cost += _COIN_M * (self._missed(model, moment) - missed)
         cost[model.state.over[:count]] = _LOST
         cost[won > 0] = _WON - won[won > 0]
         return actions[:_EVERY, :count], cost
+
+    def _missed(self, simulation: Simulation, moment: Int64) -> Int64:
+        """Return how many coins less games have than the play had, (n,)."""
+        missing = self._reference.coins[moment] - simulation.state.coins[: len(moment)]
+        missed: Int64 = np.maximum(missing, 0)
+        return missed
 
     def _steered(self, simulation: Simulation, moment: Int64) -> Int64:
         rows = slice(len(moment))
