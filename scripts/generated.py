@@ -5,6 +5,7 @@ Examples::
     python scripts/generated.py
     python scripts/generated.py --seeds 100
     python scripts/generated.py --prove 500 --difficulty 0.25
+    python scripts/generated.py --sheet docs/images/generated-v2.png
     python scripts/generated.py --quick --out runs/generated.csv
 """
 
@@ -17,11 +18,18 @@ from pathlib import Path
 from typing import Any
 
 import tyro
+from PIL import Image
 from tqdm import tqdm
 
+from roller_env.drawing.overview import render_overview
 from roller_env.lab import generated
+from roller_env.level.generate import LATEST, generate
 from roller_env.level.proved import read_verdicts, verdicts_file, write_verdicts
 from roller_env.solver import won_level
+
+
+SHEET_TILE = (220, 150)
+"""Width and height of a level's picture on the sheet, pixels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +54,12 @@ class Arguments:
     first_seed: int = 0
     """Of what is proved."""
 
+    version: int = LATEST
+    """Of the generator."""
+
+    sheet: Path | None = None
+    """Draw 64 levels, eight of each of eight difficulties, into this picture instead."""
+
     quick: bool = False
     """One seed of two difficulties."""
 
@@ -53,7 +67,10 @@ class Arguments:
 def main(arguments: Arguments) -> None:
     """Do what the command line says."""
     if arguments.prove is not None:
-        prove(arguments.difficulty, arguments.first_seed, arguments.prove)
+        prove(arguments.difficulty, arguments.first_seed, arguments.prove, arguments.version)
+        return
+    if arguments.sheet is not None:
+        sheet(arguments.sheet, arguments.version)
         return
     if not arguments.show:
         seeds = 1 if arguments.quick else arguments.seeds
@@ -62,15 +79,26 @@ def main(arguments: Arguments) -> None:
     print(generated.table(arguments.out))
 
 
-def prove(difficulty: float, first_seed: int, count: int) -> None:
+def prove(difficulty: float, first_seed: int, count: int, version: int) -> None:
     """Add levels to the table of those that the solver has won; what is there already stays."""
-    file = verdicts_file()
+    file = verdicts_file(version)
     table = read_verdicts(file) if file.exists() else {}
     known = table.setdefault(difficulty, {})
     seeds = [seed for seed in range(first_seed, first_seed + count) if seed not in known]
     for seed in _progress(seeds):
-        known[seed] = won_level(seed, difficulty).attempts - 1
+        known[seed] = won_level(seed, difficulty, version=version).attempts - 1
         write_verdicts(table, file)
+
+
+def sheet(file: Path, version: int) -> None:
+    """Draw the first eight seeds of eight difficulties, a row for each, the easiest above."""
+    width, height = SHEET_TILE
+    picture = Image.new("RGB", (8 * width, 8 * height))
+    for number in _progress(list(range(64))):
+        row, seed = divmod(number, 8)
+        tile = render_overview(generate(seed, row / 7, version=version), width, height)
+        picture.paste(Image.fromarray(tile), (seed * width, row * height))
+    picture.quantize(256).save(file, optimize=True)
 
 
 def _progress(levels: list[Any]) -> Iterable[Any]:

@@ -16,7 +16,7 @@ import pandas
 
 from roller_env.lab.table import Frame, markdown
 from roller_env.level.expand import expand
-from roller_env.level.generate import VERSION
+from roller_env.level.generate import LATEST
 from roller_env.level.schema import Level
 from roller_env.solver import robustness, won_level
 

@@ -13,7 +13,7 @@ from roller_env.config import EnvConfig, make_config
 from roller_env.game.actions import DIRECTIONS, forces
 from roller_env.level import Level
 from roller_env.level.expand import expand
-from roller_env.level.generate import generate
+from roller_env.level.generate import LATEST, generate
 from roller_env.pieces.coin import COIN, COIN_REACH_M
 from roller_env.pieces.finish import FINISH
 from roller_env.pieces.hazard import HAZARD
@@ -270,24 +270,27 @@ GENERATED_BUDGET: Final = 600_000
 _MOST_ATTEMPTS: Final = 20
 
 
-def won_level(seed: int, difficulty: float = 0.5) -> Won:
+def won_level(seed: int, difficulty: float = 0.5, *, version: int = LATEST) -> Won:
     """Return the first generated level of a seed and difficulty that the solver wins.
 
     Args:
         seed: see `roller_env.level.generate.generate`.
         difficulty: likewise.
+        version: likewise.
 
     Raises:
+        ValueError: likewise.
         RuntimeError: none of twenty was won.
     """
     steps = 0
     for attempt in range(_MOST_ATTEMPTS):
-        level = generate(seed, difficulty, attempt)
+        level = generate(seed, difficulty, attempt, version=version)
         search = Search(level)
         solution = search.run(GENERATED_BUDGET)
         steps += search.steps
         if solution is not None:
             return Won(level, search.replay(solution), attempt + 1, steps)
     raise RuntimeError(
-        f"seed {seed}, difficulty {difficulty:g}: none of {_MOST_ATTEMPTS} levels was won"
+        f"seed {seed}, difficulty {difficulty:g}, version {version}: none of {_MOST_ATTEMPTS} "
+        "levels was won"
     )
