@@ -27,7 +27,6 @@ from roller_env.level.generate import LATEST, generate
 from roller_env.level.proved import read_verdicts, verdicts_file, write_verdicts
 from roller_env.solver import won_level
 
-
 SHEET_TILE = (220, 150)
 """Width and height of a level's picture on the sheet, pixels."""
 
@@ -39,7 +38,7 @@ class Arguments:
     seeds: int = 20
     """Of each of five difficulties."""
 
-    out: Path = Path("docs/results/generated.csv")
+    out: Path = Path("docs/results/generated-v2.csv")
     """Rows that are there already are not made again."""
 
     show: bool = False
@@ -75,7 +74,7 @@ def main(arguments: Arguments) -> None:
     if not arguments.show:
         seeds = 1 if arguments.quick else arguments.seeds
         difficulties = (0.0, 0.25) if arguments.quick else generated.DIFFICULTIES
-        generated.run(arguments.out, seeds, difficulties, _progress)
+        generated.run(arguments.out, seeds, arguments.version, difficulties, _progress)
     print(generated.table(arguments.out))
 
 

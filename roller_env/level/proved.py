@@ -15,7 +15,7 @@ from typing import Final
 
 from roller_env.assets import asset_directory
 from roller_env.checks import number, whole
-from roller_env.level.generate import LATEST, generate
+from roller_env.level.generate import LATEST, VERSIONS, generate
 from roller_env.level.schema import Level
 
 Verdicts = dict[float, dict[int, int]]
@@ -38,6 +38,7 @@ def proved_levels(
     Raises:
         ValueError: a seed is not in the table; the message says which are.
     """
+    version = whole("version", version, min(VERSIONS), LATEST)
     whole("num_levels", count, 1, MOST_LEVELS)
     whole("start_level", first_seed, 0, 2**63 - 1)
     number("difficulty", difficulty, 0.0, 1.0, "a number from 0 to 1")
@@ -51,8 +52,8 @@ def proved_levels(
         )
         raise ValueError(
             f"start_level, num_levels, difficulty: found seed {missing[0]} at difficulty "
-            f"{difficulty:g}, which nobody has proved winnable; there are {there} "
-            "(roller_env.solver.won_level proves others)"
+            f"{difficulty:g}, which nobody has proved winnable; of version {version} there are "
+            f"{there} (roller_env.solver.won_level proves others)"
         )
     return [generate(seed, difficulty, known[seed], version=version) for seed in seeds]
 

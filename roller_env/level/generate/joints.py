@@ -253,7 +253,7 @@ JOINTS: Final = {
     "wedge down": Joint(wedge, 0.3, 0.7, (-0.7, -0.3)),
     "step": Joint(step, 0.8, 1.0, (-1.1, -0.3)),
     "gap": Joint(gap, 0.0, 1.0, (-0.7, -0.25)),
-    "gate": Joint(gate, 0.5, 1.5, from_start=False),
+    "gate": Joint(gate, 0.5, 1.0, from_start=False),
     "ferry": Joint(ferry, 0.0, 1.2),
     "elevator": Joint(elevator, 0.3, 1.0, (0.8, 2.2)),
     "spring": Joint(spring, 0.3, 1.2, (-1.0, 1.2), from_start=False),

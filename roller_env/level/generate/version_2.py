@@ -230,12 +230,12 @@ class _Builder:
         errand = self._free_beside(deck) if draft.chance(self.knobs.errands) else None
         if errand is None:
             frame = deck.frame()
-            aside = (0.62 * draft.side(), 0.62 * draft.side())
+            aside = (0.6 * draft.side(), 0.6 * draft.side())
             draft.add(
                 "plates",
                 name=f"plate-{number}",
                 at=frame.point(*aside, -0.2),
-                size=(0.9, 0.9, 0.5),
+                size=(1.1, 1.1, 0.5),
                 opens=[gate],
             )
             return
