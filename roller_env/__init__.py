@@ -29,10 +29,10 @@ for _id, _options in ENV_IDS.items():
 
 GENERATED_IDS: Final[dict[str, dict[str, Any]]] = {
     "Roller/Generated-v0": {"version": 1, "num_levels": 500},
-    "Roller/Generated-v1": {"version": 2, "num_levels": 200},
+    "Roller/Generated-v1": {"version": 2, "num_levels": 200, "kinds": "all"},
 }
 """Games on generated levels, another one in every episode, by the version of the generator: an id's
-levels never change."""
+levels never change. All of the second's levels are seen alike, whichever pieces a range has."""
 
 for _id, _options in GENERATED_IDS.items():
     gym.register(

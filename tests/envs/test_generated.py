@@ -59,6 +59,12 @@ def test_each_id_keeps_to_its_version_of_the_generator() -> None:
         assert options["num_levels"] <= len(verdicts(options["version"])[0.25])
 
 
+def test_an_agent_fits_every_range_of_levels() -> None:
+    few = gym.make(ID, num_levels=1, start_level=1_000_000, disable_env_checker=True)
+    many = gym.make(ID, num_levels=20, disable_env_checker=True)
+    assert few.observation_space == many.observation_space
+
+
 def test_it_is_made_again_from_its_spec() -> None:
     env = gym.make(ID, num_levels=2, start_level=5)
     assert env.spec is not None
