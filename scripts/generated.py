@@ -5,6 +5,7 @@ Examples::
     python scripts/generated.py
     python scripts/generated.py --seeds 100
     python scripts/generated.py --prove 500 --difficulty 0.25
+    python scripts/generated.py --compile 10000
     python scripts/generated.py --sheet docs/images/generated-v2.png
     python scripts/generated.py --quick --out runs/generated.csv
 """
@@ -12,6 +13,8 @@ Examples::
 from __future__ import annotations
 
 import sys
+import time
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,11 +24,14 @@ import tyro
 from PIL import Image
 from tqdm import tqdm
 
+from roller_env.compile.compiled import compile_level
 from roller_env.drawing.overview import render_overview
 from roller_env.lab import generated
 from roller_env.level.generate import LATEST, generate
 from roller_env.level.proved import read_verdicts, verdicts_file, write_verdicts
+from roller_env.simulation import Simulation
 from roller_env.solver import won_level
+from roller_env.solver.search import solver_config
 
 SHEET_TILE = (220, 150)
 """Width and height of a level's picture on the sheet, pixels."""
@@ -56,6 +62,9 @@ class Arguments:
     version: int = LATEST
     """Of the generator."""
 
+    compile: int | None = None
+    """Compile so many levels, of 21 difficulties in turn, for both engines instead."""
+
     sheet: Path | None = None
     """Draw 64 levels, eight of each of eight difficulties, into this picture instead."""
 
@@ -70,6 +79,9 @@ def main(arguments: Arguments) -> None:
         return
     if arguments.sheet is not None:
         sheet(arguments.sheet, arguments.version)
+        return
+    if arguments.compile is not None:
+        compile_levels(arguments.compile, arguments.version)
         return
     if not arguments.show:
         seeds = 1 if arguments.quick else arguments.seeds
@@ -87,6 +99,18 @@ def prove(difficulty: float, first_seed: int, count: int, version: int) -> None:
     for seed in _progress(seeds):
         known[seed] = won_level(seed, difficulty, version=version).attempts - 1
         write_verdicts(table, file)
+
+
+def compile_levels(count: int, version: int) -> None:
+    """Compile levels for both engines; a warning is an error."""
+    begun = time.process_time()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for seed in _progress(list(range(count))):
+            level = generate(seed, (seed % 21) / 20, version=version)
+            compile_level(level)
+            Simulation(solver_config(level)).reset()
+    print(f"{count} levels compiled for both engines in {time.process_time() - begun:.0f} s of CPU")
 
 
 def sheet(file: Path, version: int) -> None:
