@@ -20,7 +20,7 @@ MATRIX := .venv-matrix
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup train play test coverage matrix lint format docs benchmark clean
+.PHONY: help setup train play test coverage matrix lint format page docs benchmark clean
 .DELETE_ON_ERROR:
 
 help: ## show this list
@@ -41,7 +41,7 @@ $(READY): pyproject.toml constraints.txt
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
 		--constraint constraints.txt hatchling editables
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input \
-		--constraint constraints.txt --no-build-isolation --editable '.[train,lab,play,sound,video,demos,docs,dev]'
+		--constraint constraints.txt --no-build-isolation --editable '.[train,lab,play,video,demos,docs,dev]'
 	@$(BIN)/python -m roller_env
 	@touch $(READY)
 	@echo "$(VENV) is ready."
@@ -73,6 +73,9 @@ format: $(READY) ## let ruff format the code and mend what it can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
+page: ## build the page from its TypeScript into assets/page, and test it (needs Node 20)
+	cd page && npm ci --no-audit --no-fund && npm run lint && npm run check && npm test && npm run build
+
 docs: $(READY) ## build the documentation into site/; a dead link is an error
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "site/index.html"
@@ -87,5 +90,5 @@ $(PEERS)/.ready: scripts/benchmark-peers.txt
 	@touch $@
 
 clean: ## remove the environments and caches; runs/ stays
-	rm -rf $(VENV) $(PEERS) $(MATRIX) build dist site .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) page/node_modules $(PEERS) $(MATRIX) build dist site .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -12,7 +12,7 @@ from typing import Final, Literal
 
 from roller_env.problems import listed
 
-Kind = Literal["levels", "replays", "sounds", "generated", "configs"]
+Kind = Literal["levels", "replays", "sounds", "pictures", "page", "generated", "configs"]
 
 LEVELS: Final = (
     "flat",
@@ -42,6 +42,8 @@ _IN_A_CHECKOUT: Final[dict[Kind, str]] = {
     "levels": "assets/levels",
     "replays": "assets/replays",
     "sounds": "assets/sounds",
+    "pictures": "docs/images/levels",
+    "page": "assets/page",
     "generated": "assets/generated",
     "configs": "configs",
 }

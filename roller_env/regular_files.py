@@ -12,6 +12,9 @@ import stat
 from pathlib import Path
 from typing import Final
 
+LOOK_EVERY_S: Final = 0.3
+"""How often to look whether a file has been saved."""
+
 _KINDS: Final = {
     stat.S_IFIFO: "a pipe",
     stat.S_IFSOCK: "a socket",
@@ -56,3 +59,30 @@ def _check_kind(mode: int) -> None:
     if not stat.S_ISREG(mode):
         kind = _KINDS.get(stat.S_IFMT(mode), "something else")
         raise OSError(errno.EINVAL, f"found {kind}; wanted a regular file")
+
+
+class SavedFile:
+    """A file that somebody writes: says whether it has been saved since it was asked last.
+
+    An editor may write the file in place or put another in its place; while there is none, nothing
+    was saved.
+    """
+
+    def __init__(self, path: Path):
+        self._path = path
+        self._before: tuple[int, ...] | None = ()
+
+    def is_new(self) -> bool:
+        """Say whether the file has been saved; so it is at the first time, there or not."""
+        now = self._signature()
+        if now == self._before or (now is None and self._before != ()):
+            return False
+        self._before = now
+        return True
+
+    def _signature(self) -> tuple[int, ...] | None:
+        try:
+            found = self._path.stat()
+        except OSError:
+            return None
+        return found.st_mtime_ns, found.st_size, found.st_ino

@@ -32,7 +32,7 @@ class Command:
 COMMANDS: Final[dict[str, Command]] = {
     "train": Command("train an agent, evaluate it and draw what it does", "train"),
     "evaluate": Command("play a trained agent and say how good it is", "train"),
-    "play": Command("play in a browser page or a window, or watch a trained agent play"),
+    "play": Command("play in a browser page, or watch a trained agent play", "play"),
     "replay": Command("verify a replay bit for bit, show it, film it, convert it"),
     "level": Command("check, draw and begin levels; watch one while it is written"),
 }
@@ -41,6 +41,7 @@ COMMANDS: Final[dict[str, Command]] = {
 _EXTRA_OF: Final = {
     **dict.fromkeys(("stable_baselines3", "torch", "safetensors", "tensorboard"), "train"),
     **dict.fromkeys(("matplotlib", "PIL", "imageio", "tqdm"), "train"),
+    **dict.fromkeys(("starlette", "uvicorn", "websockets"), "play"),
     "minari": "demos",
 }
 """Which extra of this package brings a package that is missing."""

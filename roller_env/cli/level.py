@@ -17,7 +17,6 @@ Examples::
 from __future__ import annotations
 
 import json
-import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -26,7 +25,7 @@ from typing import Annotated, Final, Literal
 
 import tyro
 
-from roller_env.game.actions import KEY_FORCE_N
+from roller_env.game.actions import hardest_play
 from roller_env.level import (
     Level,
     LevelError,
@@ -39,11 +38,11 @@ from roller_env.level import (
 from roller_env.level.expand import expand
 from roller_env.level.generate import LATEST
 from roller_env.level.maps import export_map, read_map
-from roller_env.level.reach import Play
 from roller_env.level.template import new_level
 from roller_env.level.text import fields_text, level_text
 from roller_env.physics.presets import physics_preset
 from roller_env.problems import Problem, printable, shown
+from roller_env.regular_files import LOOK_EVERY_S, SavedFile
 from roller_env.yaml_tree import MAX_BYTES
 
 Preset = Literal["fast", "default", "accurate", "rigid", "relaxed"]
@@ -55,8 +54,6 @@ OVERVIEW_SIZE: Final = (1280, 800)
 """Width and height in pixels."""
 
 PICTURES: Final = (".png", ".jpg", ".jpeg", ".webp")
-
-_LOOK_EVERY_S: Final = 0.3
 
 
 class CommandError(Exception):
@@ -100,6 +97,8 @@ def _told(command: Callable[[], int]) -> int:
         print(f"error: {printable(error)}", file=sys.stderr)
     except OSError as error:
         print(f"error: {shown(error.filename)}: {error.strerror}", file=sys.stderr)
+    except RuntimeError as error:
+        print(f"error: {printable(error)}", file=sys.stderr)
     return 1
 
 
@@ -131,7 +130,7 @@ def check(
 def _report(source: str, physics: Preset) -> tuple[int, int]:
     """Print what is wrong with a level; return how many errors and warnings that were."""
     try:
-        _, warnings = examine_level(source, _play(physics))
+        _, warnings = examine_level(source, hardest_play(physics_preset(physics)))
     except LevelError as error:
         for problem in error.problems:
             print(_line(problem, "error"))
@@ -139,15 +138,6 @@ def _report(source: str, physics: Preset) -> tuple[int, int]:
     for problem in warnings:
         print(_line(problem, "warning"))
     return 0, len(warnings)
-
-
-def _play(physics: Preset) -> Play:
-    preset = physics_preset(physics)
-    # The hardest push is that of two keys.
-    return Play(
-        dt_s=preset.dt_s if preset.engine == "mujoco" else 0.0,
-        push_n=math.hypot(KEY_FORCE_N, KEY_FORCE_N),
-    )
 
 
 def _line(problem: Problem, kind: str) -> str:
@@ -415,22 +405,30 @@ def watch(
     output: Output = None,
     view: View = "plan",
     physics: Preset = "default",
+    port: int = 0,
 ) -> int:
-    """Check a level and draw it anew on every save, until Ctrl-C.
+    """Play a level in the browser while it is written: it is loaded anew on every save.
 
-    A picture viewer that notices when its file changes shows the level beside the editor.
+    What is wrong with it is shown there, too. With an output, a picture of it is drawn instead, for
+    a viewer that notices when its file changes. Ctrl-C ends it.
 
     Args:
         file: level file.
-        output: picture to write; by default beside the file, with its name and .png.
-        view: plan needs no OpenGL, overview does.
-        physics: physics preset that the floors must be thick enough for.
+        output: picture to write, in place of the page.
+        view: of the picture: plan needs no OpenGL, overview does.
+        physics: physics preset to play with, and that the floors must be thick enough for.
+        port: where the page is served, to this machine only; 0 takes the first free one from 8080.
     """
-    picture = output or file.with_suffix(".png")
-    _check_picture(picture)
+    if output is None:
+        # Imported here: the rest needs no server.
+        from roller_env.play.workbench import watch_level
+
+        watch_level(file, physics, port)
+        return 0
+    _check_picture(output)
     try:
         for _ in saves(file):
-            look(file, picture, view, physics)
+            look(file, output, view, physics)
     except KeyboardInterrupt:
         print()
     return 0
@@ -440,7 +438,7 @@ def look(file: Path, picture: Path, view: View, physics: Preset) -> None:
     """Check a level file and, if it can be played, draw it."""
     print(time.strftime("%H:%M:%S"), end=" ")
     try:
-        level, warnings = examine_level(file, _play(physics))
+        level, warnings = examine_level(file, hardest_play(physics_preset(physics)))
     except LevelError as error:
         print(_number(len(error.problems), "error"))
         print("\n".join(_line(problem, "error") for problem in error.problems), flush=True)
@@ -450,27 +448,13 @@ def look(file: Path, picture: Path, view: View, physics: Preset) -> None:
     print("".join(f"{_line(problem, 'warning')}\n" for problem in warnings), end="", flush=True)
 
 
-def saves(file: Path, every_s: float = _LOOK_EVERY_S) -> Iterator[None]:
-    """Yield at once, and then whenever a file has been saved; never ends.
-
-    An editor may write the file in place or put another in its place; while there is none, nothing
-    was saved.
-    """
-    before: tuple[int, ...] | None = ()
+def saves(file: Path) -> Iterator[None]:
+    """Yield at once, and then whenever a file has been saved; never ends."""
+    saved = SavedFile(file)
     while True:
-        now = _signature(file)
-        if now != before and (now is not None or before == ()):
-            before = now
+        if saved.is_new():
             yield
-        time.sleep(every_s)
-
-
-def _signature(file: Path) -> tuple[int, ...] | None:
-    try:
-        found = file.stat()
-    except OSError:
-        return None
-    return found.st_mtime_ns, found.st_size, found.st_ino
+        time.sleep(LOOK_EVERY_S)
 
 
 COMMANDS: Final[dict[str, Callable[..., int]]] = {

@@ -1,11 +1,13 @@
-"""Play the game in a browser page, in a window, or watch a trained agent play.
+"""Play the game in a browser page, or watch a trained agent play.
 
 Examples::
 
     roller play
     roller play bridge --skip-intro
     roller play --policy runs/ppo_classic-seed0
-    roller play my_level.yaml --physics accurate --viewer native
+    roller play --policy runs/ppo_classic-seed0 --agents 64
+    roller play classic --against runs/ppo_classic-seed0
+    roller play my_level.yaml --physics accurate
 """
 
 from __future__ import annotations
@@ -15,28 +17,23 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import tyro
 
 from roller_env.config import EnvConfig
-from roller_env.play.app import GamePlugin, ScreenPlugin, level_choices
-from roller_env.play.scene import Quality
-from roller_env.play.server import (
-    DEFAULT_PORT,
-    LOOPBACK,
-    NATIVE_NOTE,
-    check_address,
-    open_page,
-    open_window,
-    run,
-    warning_of,
-)
-from roller_env.play.session import GameSession, Player, play_config
-from roller_env.play.sound import CoinSound
+from roller_env.play.offers import offers_of
+from roller_env.play.records import Records, default_file
+from roller_env.play.room import Room
+from roller_env.play.server import DEFAULT_PORT, LOOPBACK, listen, serve, warning_of
+from roller_env.play.session import GameSession, Observer, play_config
 from roller_env.problems import printable
 from roller_env.replay import datasets
 from roller_env.replay.keeper import ReplayKeeper
+
+if TYPE_CHECKING:
+    from roller_env.play.autopilot import Autopilot
+    from roller_env.play.crowd import Crowd
 
 RECORDED: Final = Path("replays")
 """Where games are kept that are to become data sets, if nothing else is asked for."""
@@ -58,10 +55,7 @@ class Arguments:
     host: str = LOOPBACK
     """Address to listen on. By default only this machine reaches the page."""
 
-    viewer: Literal["web", "native"] = "web"
-    """A page in the browser, or a window (Python 3.12 or newer)."""
-
-    quality: Quality = "high"
+    quality: Literal["high", "low"] = "high"
     """low is for machines that draw without a graphics processor."""
 
     physics: str | None = None
@@ -76,6 +70,13 @@ class Arguments:
     policy: Path | None = None
     """A run's directory: its agent plays until you press a key."""
 
+    against: Path | None = None
+    """A run's directory: balls of its agent play beside the game; by default, with --agents, those
+    of --policy."""
+
+    agents: int | None = None
+    """How many balls play beside the game, up to 256; by default one, with --against."""
+
     trust: bool = False
     """Also play an agent that is kept as pickles, as Stable-Baselines3 saves it. A pickle runs any
     program its maker put into it: only for runs of people you trust."""
@@ -87,8 +88,8 @@ class Arguments:
     """Prefix of Minari data sets of what was played, one a level, such as roller/human. Every game
     is kept as a replay too, without --replays in the directory replays."""
 
-    mute: bool = False
-    """No sound."""
+    records: Path | None = None
+    """File of best times, coins and medals; by default one of yours, where programs keep data."""
 
 
 def main(argv: Sequence[str] | None = None, prog: str | None = None) -> int:
@@ -115,31 +116,37 @@ def play(arguments: Arguments) -> int:
         datasets.check_prefix(arguments.record)
         # The data sets are written at the end, and what is killed before has none.
         directory = directory or RECORDED
-    if arguments.viewer == "web":
-        check_address(arguments.host, arguments.port)
+    listening = listen(arguments.host, arguments.port)
     # When its terminal is closed, the game still writes what was recorded.
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.default_int_handler)
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.default_int_handler)
     config, agent = game_of(arguments)
     keeper = ReplayKeeper(directory, "human" if agent is None else "agent and human")
-    choices = level_choices(config.level)
-    sound = CoinSound(muted=arguments.mute)
-    if sound.silent_because and not arguments.mute:
-        print(f"no sound: {sound.silent_because}")
-    sessions = session_maker(config, agent, arguments, keeper)
-    game = GamePlugin(sessions, choices, sound, arguments.quality)
-    plugins = (game, ScreenPlugin(choices))
-    if arguments.viewer == "native":
-        handle = open_window(plugins)
-        print(NATIVE_NOTE)
-    else:
-        if warning := warning_of(arguments.host):
-            print(warning, file=sys.stderr)
-        handle = open_page(plugins, port=arguments.port, host=arguments.host)
+    records = Records(arguments.records or default_file())
+    crowd = crowd_of(agent, arguments)
+    offers = offers_of(config.level)
+    for policy in [each.policy for each in (agent, crowd) if each is not None]:
+        offers = [offer for offer in offers if policy.plays(offer.level)]
+    room = Room(
+        game_opener(config, agent, arguments),
+        offers,
+        str(config.level),
+        keeper=keeper,
+        records=records,
+        agent=agent,
+        agent_name=arguments.policy.name if arguments.policy else "",
+        crowd=crowd,
+        quality=arguments.quality,
+        skip_intro=arguments.skip_intro,
+    )
+    if warning := warning_of(arguments.host):
+        print(warning, file=sys.stderr)
     try:
-        run(handle)
+        serve(room, listening, arguments.host)
     finally:
         status = write_record(keeper, arguments.record)
+        records.close()
     return status
 
 
@@ -149,8 +156,9 @@ def write_record(keeper: ReplayKeeper, record: str | None) -> int:
     problems: tuple[str, ...] = ()
     if record is not None:
         # Whoever closes the terminal or shuts the machine down asks more than once.
-        for number in (signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, signal.SIG_IGN)
+        for name in ("SIGTERM", "SIGHUP"):
+            if hasattr(signal, name):
+                signal.signal(getattr(signal, name), signal.SIG_IGN)
         written = datasets.to_minari_by_level(keeper.replays, record)
         lines += [f"data set: {name}" for name in written.names]
         problems = written.problems
@@ -164,7 +172,7 @@ def write_record(keeper: ReplayKeeper, record: str | None) -> int:
     return 1 if problems else 0
 
 
-def game_of(arguments: Arguments) -> tuple[EnvConfig, Player | None]:
+def game_of(arguments: Arguments) -> tuple[EnvConfig, Autopilot | None]:
     """Return the options of the game, and the agent that plays it, if one does."""
     if arguments.policy is None:
         physics = arguments.physics or "default"
@@ -177,18 +185,35 @@ def game_of(arguments: Arguments) -> tuple[EnvConfig, Player | None]:
     )
 
 
-def session_maker(
-    config: EnvConfig, agent: Player | None, arguments: Arguments, keeper: ReplayKeeper
-) -> Callable[[str], GameSession]:
+def crowd_of(agent: Autopilot | None, arguments: Arguments) -> Crowd | None:
+    """Return the balls that play beside the game, if any do."""
+    if arguments.against is None and arguments.agents is None:
+        return None
+    # Imported here: it takes torch, which a person's game does not need.
+    from roller_env.play.crowd import Crowd
+    from roller_env.training.policy import load_policy
+
+    if arguments.against is not None:
+        policy = load_policy(arguments.against, trust=arguments.trust)
+    elif agent is not None:
+        policy = agent.policy
+    else:
+        raise ValueError("agents: found no agent to play; --against or --policy names one")
+    return Crowd(policy, 1 if arguments.agents is None else arguments.agents)
+
+
+def game_opener(
+    config: EnvConfig, agent: Autopilot | None, arguments: Arguments
+) -> Callable[[str, Sequence[Observer]], GameSession]:
     """Return what makes the game of a level."""
 
-    def make(level: str) -> GameSession:
+    def open_game(level: str, observers: Sequence[Observer]) -> GameSession:
         return GameSession(
             replace(config, level=level),
             skip_intro=arguments.skip_intro,
             seed=arguments.seed,
             agent=agent,
-            observers=(keeper,),
+            observers=observers,
         )
 
-    return make
+    return open_game

@@ -4,6 +4,7 @@ Examples::
 
     roller replay classic
     roller replay classic --show
+    roller replay classic --html classic.html
     roller replay mine.replay --video mine.mp4 --sheet mine.png
     roller replay old.replay --convert new.replay
     roller replay replays --record roller/human
@@ -15,6 +16,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from socket import socket
 from typing import Annotated, Literal
 
 import tyro
@@ -38,6 +40,7 @@ from roller_env.replay.pictures import contact_sheet, film
 
 _SHEET_SUFFIXES = (".png", ".jpg", ".jpeg", ".webp")
 _VIDEO_SUFFIXES = (".mp4", ".gif")
+_PAGE_SUFFIXES = (".html", ".htm")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +60,8 @@ class Arguments:
     port: int = 8080
     """Where the page is served, to this machine only; 0 takes the first free port from 8080."""
 
-    quality: Literal["high", "low"] = "high"
-    """Of the page; low is for machines that draw without a graphics processor."""
+    html: Path | None = None
+    """Write it as one file that anybody opens in a browser, an .html: no server, no network."""
 
     video: Path | None = None
     """Film it, to an .mp4 or a .gif."""
@@ -98,6 +101,7 @@ def main(argv: Sequence[str] | None = None, prog: str | None = None) -> int:
 
 def _replay(arguments: Arguments) -> int:
     _check(arguments)
+    listening = _listening(arguments) if arguments.show else None
     shipped = shipped_replays()
     if arguments.file not in shipped and not Path(arguments.file).exists():
         known = ", ".join(shipped)
@@ -113,7 +117,7 @@ def _replay(arguments: Arguments) -> int:
     print(about(replay))
     status = 0
     if arguments.verify or not (
-        arguments.show or arguments.video or arguments.sheet or arguments.convert
+        arguments.show or arguments.html or arguments.video or arguments.sheet or arguments.convert
     ):
         verification = verify(replay)
         print(verification)
@@ -124,9 +128,22 @@ def _replay(arguments: Arguments) -> int:
         print(
             f"written to {contact_sheet(replay, arguments.sheet, arguments.camera, arguments.size)}"
         )
-    if arguments.show:
-        _show(replay, arguments)
+    if arguments.html is not None:
+        # Imported here: it takes what pages are made with.
+        from roller_env.play.html import write_html
+
+        print(f"written to {write_html(replay, arguments.html)}")
+    if listening is not None:
+        _show(replay, listening)
     return status
+
+
+def _listening(arguments: Arguments) -> socket:
+    """Return where the page is to be served, before anything is loaded for it."""
+    # Imported here: the rest needs no server.
+    from roller_env.play.server import LOOPBACK, listen
+
+    return listen(LOOPBACK, arguments.port)
 
 
 def _record(source: Path, prefix: str) -> int:
@@ -151,14 +168,17 @@ def _record(source: Path, prefix: str) -> int:
     return 1 if problems or written.problems else 0
 
 
-def _show(replay: Replay, arguments: Arguments) -> None:
-    # Imported here: the rest needs no viewer.
-    from roller_env.play.replay_page import replay_plugins
-    from roller_env.play.server import open_page, run
-    from roller_env.play.sound import CoinSound
+def _show(replay: Replay, listening: socket) -> None:
+    # Imported here: the rest needs no server.
+    from roller_env.play.replay_session import ReplaySession
+    from roller_env.play.room import Offer, Room
+    from roller_env.play.server import serve
 
-    plugins = replay_plugins(replay, CoinSound(muted=False), arguments.quality)
-    run(open_page(plugins, port=arguments.port))
+    name = replay.level.name
+    serve(
+        Room(lambda _, __: ReplaySession(replay), [Offer(name, replay.level)], name, mode="replay"),
+        listening,
+    )
 
 
 def _check(arguments: Arguments) -> None:
@@ -166,6 +186,7 @@ def _check(arguments: Arguments) -> None:
     for path, suffixes in (
         (arguments.video, _VIDEO_SUFFIXES),
         (arguments.sheet, _SHEET_SUFFIXES),
+        (arguments.html, _PAGE_SUFFIXES),
     ):
         if path is not None and path.suffix.lower() not in suffixes:
             raise ReplayError(f"{path}: the name must end in {' or '.join(suffixes)}")
@@ -173,11 +194,6 @@ def _check(arguments: Arguments) -> None:
         raise ReplayError(f"{arguments.convert}: there is such a file, which is not overwritten")
     if arguments.record is not None:
         check_prefix(arguments.record)
-    if arguments.show:
-        # Imported here: the rest needs no viewer.
-        from roller_env.play.server import LOOPBACK, check_address
-
-        check_address(LOOPBACK, arguments.port)
     if arguments.camera != "game" and arguments.camera not in range(len(MODES)):
         raise ReplayError(f"camera: found {arguments.camera}; allowed are game and 0 to 5")
     if any(edge % 2 or not 16 <= edge <= 4096 for edge in arguments.size):

@@ -152,8 +152,7 @@ def _add_level_material(
 def alpha_of_face(alpha: float) -> float:
     """Return the opacity, 0 to 1, of each face of a body that is to have ``alpha`` as a whole.
 
-    MuJoCo draws both faces of a wall or slab that one can see through, one over the other. Studio's
-    page draws the nearer one, and mixes in linear light: there it looks like half instead of 0.6.
+    MuJoCo draws both faces of a wall or slab that one can see through, one over the other.
     """
     return 1.0 - math.sqrt(1.0 - alpha)
 

@@ -6,12 +6,15 @@ with 1.41 times the force along the diagonal, and opposite keys cancel.
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from roller_env.arrays import Float64
+from roller_env.level.reach import Play
+from roller_env.physics.presets import PhysicsPreset
 from roller_env.units import quants
 
 ActionMode = Literal["directions", "keys", "force"]
@@ -152,3 +155,12 @@ def _pushes(push: Float64, force_n: Float64) -> Float64:
 
 def _refused(actions: npt.NDArray[Any], takes: str) -> ValueError:
     return ValueError(f"actions: found shape {actions.shape} of {actions.dtype}; {takes}")
+
+
+def hardest_play(preset: PhysicsPreset) -> Play:
+    """Return how a level is played where whoever plays pushes as hard as the keys can."""
+    return Play(
+        dt_s=preset.dt_s if preset.engine == "mujoco" else 0.0,
+        # The hardest push is that of two keys.
+        push_n=math.hypot(KEY_FORCE_N, KEY_FORCE_N),
+    )

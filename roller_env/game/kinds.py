@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from numba import config
-from numba.extending import overload
 
 from roller_env.arrays import Int64
 from roller_env.compiled import inlined, spliced
@@ -32,15 +31,7 @@ def all_hooks(name: str) -> AllHooks:
         for hook, table, state, own in zip(hooks, tables, states, owns, strict=True):
             hook(now, table, state, Own(*own))
 
-    if not config.DISABLE_JIT:  # type: ignore[attr-defined]
-        compiled = _chain(hooks)
-
-        # Not strict: of annotated arguments it would find other names.
-        @overload(call, strict=False, inline="always")
-        def _(now: Any, tables: Any, states: Any, owns: Any) -> AllHooks:
-            return lambda now, tables, states, owns: compiled(now, tables, states, owns)  # noqa: PLW0108
-
-    return call
+    return call if config.DISABLE_JIT else _chain(hooks)  # type: ignore[attr-defined]
 
 
 def _chain(hooks: list[Hook]) -> AllHooks:

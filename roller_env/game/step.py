@@ -10,6 +10,7 @@ coins and ends with the finish; the fall comes after that.
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final, NamedTuple, get_args
 
 import numpy as np
@@ -500,7 +501,7 @@ def _measure(
         coins = games.state.kinds[_COINS]
         distance = distance_to_next(games.tables[_COINS], coins, level, env, ball)
         if distance == np.inf:
-            distance = np.sqrt(
+            distance = math.sqrt(
                 distance2(games.regions.centre[level, games.owns[_FINISHES, 0]], ball)
             )
         progress = nearness(distance)

@@ -7,15 +7,17 @@ is there, so that an experiment of hours can be stopped and gone on with.
 from __future__ import annotations
 
 import csv
+import io
 import os
+import tarfile
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pandas
@@ -24,11 +26,14 @@ from matplotlib.figure import Figure
 from roller_env import __version__
 from roller_env.game.result import EpisodeResult
 from roller_env.lab import chart
+from roller_env.lab.runner import provenance
 from roller_env.lab.table import Frame, markdown
-from roller_env.training import load_config
+from roller_env.training import TrainingConfig, load_config
+from roller_env.training.checkpoint import Progress
 from roller_env.training.files import RunFiles
 from roller_env.training.logs import STEPS, read_progress
 from roller_env.training.policy import load_policy
+from roller_env.training.ppo import has_spent_all
 from roller_env.training.run import evaluate_policy, learn_to_mastery
 
 RECIPE: Final = "recipe"
@@ -96,11 +101,13 @@ class Experiment:
         trials: in the order in which they are made.
         changes: overrides of the recipe for all of them.
         judged_on: physics presets on which the agents play besides the evaluation's own.
+        on_record: whether rows say how their training ended, where and with which versions.
     """
 
     trials: tuple[Trial, ...]
     changes: tuple[str, ...] = ()
     judged_on: tuple[str, ...] = ()
+    on_record: bool = False
 
 
 EXPERIMENTS: Final[Mapping[str, Experiment]] = {
@@ -143,14 +150,35 @@ QUICK: Final = Experiment(
 """An experiment of seconds that shows nothing but that it works."""
 
 
+UNFINISHED: Final = "unfinished"
+"""How a training ended that its deadline cut off; it is made again when there is time."""
+
+EVALUATION_S: Final = 45.0
+"""Kept free before a deadline: an agent may be judged twice after its last step."""
+
+SHORTEST_S: Final = 60.0
+"""A training that has less than this left is not begun."""
+
+
+class Tried(NamedTuple):
+    """What a trial leaves: its row, its learning curve, and its policy's files by their names."""
+
+    row: dict[str, Any]
+    curve: list[dict[str, Any]]
+    policy: dict[str, bytes]
+
+
 def run(
     experiment: Experiment,
     recipe: Path,
     stem: Path,
     jobs: int,
     progress: Callable[[Iterable[Any], int], Iterable[Any]] = lambda rows, _: rows,
+    *,
+    deadline_s: float | None = None,
+    policies: Path | None = None,
 ) -> None:
-    """Make the trials of which there is no row yet.
+    """Make the trials of which there is no row yet, or only one of an unfinished training.
 
     Args:
         experiment: what to try.
@@ -158,18 +186,83 @@ def run(
         stem: the rows go into ``stem.csv``, the learning curves into ``stem_curves.csv``.
         jobs: trainings at a time.
         progress: wraps the trials as they are done, given their number.
+        deadline_s: moment, as `time.time` has it, at which all is to be over: trainings end before
+            it, and count as unfinished if they are.
+        policies: tar file to which ``LEVEL-SEED/policy.json`` and ``.safetensors`` are added.
+
+    Raises:
+        BaseExceptionGroup: trials failed; the others are there.
     """
+    forget_unfinished(stem)
     done = {(row["variant"], row["level"], int(row["seed"])) for row in _rows(_results(stem))}
     missing = [trial for trial in experiment.trials if trial.key not in done]
     stem.parent.mkdir(parents=True, exist_ok=True)
+    failed: list[BaseException] = []
+    trials = _finished(missing, experiment, recipe, jobs, deadline_s)
+    for trial in progress(trials, len(missing)):
+        fault = trial.exception()
+        if fault is not None:
+            failed.append(fault)
+            continue
+        tried: Tried = trial.result()
+        # The row last: a trial whose row is there is whole.
+        if policies is not None:
+            _keep(policies, f"{tried.row['level']}-{tried.row['seed']}", tried.policy)
+        _append(_curves(stem), tried.curve)
+        _append(_results(stem), [tried.row])
+    if failed:
+        raise BaseExceptionGroup(f"{len(failed)} trials failed", failed)
+
+
+def _finished(
+    trials: Iterable[Trial],
+    experiment: Experiment,
+    recipe: Path,
+    jobs: int,
+    deadline_s: float | None,
+) -> Iterator[Future[Tried]]:
+    """Yield trials as they are done; begin none that could not end in time."""
+    waiting, running = iter(trials), set[Future[Tried]]()
     # A process for each: what one leaves behind in PyTorch or Numba is not the next one's.
     with ProcessPoolExecutor(jobs, get_context("spawn"), max_tasks_per_child=1) as pool:
-        trials = [pool.submit(_tried, trial, experiment, recipe) for trial in missing]
-        for trial in progress(as_completed(trials), len(trials)):
-            row, curve = trial.result()
-            # The curve first: a trial whose row is there is whole.
-            _append(_curves(stem), curve)
-            _append(_results(stem), [row])
+        while True:
+            while len(running) < jobs and _left_s(deadline_s) >= SHORTEST_S:
+                trial = next(waiting, None)
+                if trial is None:
+                    break
+                running.add(pool.submit(_tried, trial, experiment, recipe, deadline_s))
+            if not running:
+                return
+            done, running = wait(running, return_when=FIRST_COMPLETED)
+            yield from done
+
+
+def _left_s(deadline_s: float | None) -> float:
+    """Return for how long a training may go on so that it is judged before a deadline."""
+    return np.inf if deadline_s is None else deadline_s - EVALUATION_S - time.time()
+
+
+def _keep(file: Path, name: str, content: Mapping[str, bytes]) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with tarfile.open(file, "a") as archive:
+        for part, data in content.items():
+            member = tarfile.TarInfo(f"{name}/{part}")
+            member.size = len(data)
+            archive.addfile(member, io.BytesIO(data))
+
+
+def forget_unfinished(stem: Path) -> None:
+    """Take out the rows and curves of trainings that a deadline cut off."""
+    rows = list(_rows(_results(stem)))
+    kept = [row for row in rows if row.get("ended") != UNFINISHED]
+    if len(kept) == len(rows):
+        return
+    keys = {(row["level"], row["seed"]) for row in kept}
+    curves = [row for row in _rows(_curves(stem)) if (row["level"], row["seed"]) in keys]
+    for file, content in ((_curves(stem), curves), (_results(stem), kept)):
+        file.unlink()
+        if content:
+            _append(file, content)
 
 
 def _results(stem: Path) -> Path:
@@ -195,12 +288,12 @@ def _append(file: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         writer.writerows(rows)
 
 
-def _tried(
-    trial: Trial, experiment: Experiment, recipe: Path
-) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return a trial's row and its learning curve."""
+def _tried(trial: Trial, experiment: Experiment, recipe: Path, deadline_s: float | None) -> Tried:
     own = (f"level={trial.level}", f"seed={trial.seed}", "checkpoint_interval_s=1e9")
     config = load_config(recipe, (*own, *experiment.changes, *VARIANTS[trial.variant]))
+    if deadline_s is not None:
+        left_s = max(_left_s(deadline_s), 1.0)
+        config = config.model_copy(update={"wall_clock_budget_s": left_s})
     names = {"variant": trial.variant, "level": trial.level, "seed": trial.seed}
     with tempfile.TemporaryDirectory() as directory:
         files = RunFiles(Path(directory))
@@ -217,6 +310,7 @@ def _tried(
             finish, coins = shares(others)
             elsewhere |= {f"finish on {physics}": finish, f"coins on {physics}": coins}
         curve = list(_thinned(read_progress(files.progress), evaluation.coins_in_level))
+        kept = {file.name: file.read_bytes() for file in (files.policy, files.weights)}
     results = evaluation.results
     finish, coins = shares(results)
     row = names | {
@@ -230,7 +324,17 @@ def _tried(
         "roller": __version__,
         "processors": os.cpu_count(),
     }
-    return row | elsewhere, [names | point for point in curve]
+    if experiment.on_record:
+        facts = provenance(("mujoco", "torch", "numpy"))
+        del facts["command"], facts["roller"]
+        row |= {"ended": _ended(config, progress)} | facts
+    return Tried(row | elsewhere, [names | point for point in curve], kept)
+
+
+def _ended(config: TrainingConfig, progress: Progress) -> str:
+    if progress.steps >= config.total_steps:
+        return "all steps"
+    return UNFINISHED if has_spent_all(config, progress) else "mastered"
 
 
 def shares(results: Sequence[EpisodeResult]) -> tuple[float, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Final, NamedTuple
 
@@ -288,7 +289,7 @@ def distance_to_next(
         right += back > ahead
         if not state.taken[env, coin]:
             least2 = min(least2, distance2(table.at[level, coin], ball))
-    distance: float = np.sqrt(least2)
+    distance: float = math.sqrt(least2)
     return distance
 
 

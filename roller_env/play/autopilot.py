@@ -1,50 +1,77 @@
-"""Autopilot: a trained agent as the player of a person's game.
+"""Autopilot: a trained agent as the player of a game that somebody watches.
 
-The game is stepped as finely as for a person, who may take over at any moment; the agent is asked
-as often as in its training, and what it answered holds until then. It sees what it saw in training.
+The control step is the agent's own, so that the game is, bit for bit, the one of its evaluation,
+until a person takes the ball.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from roller_env.config import EnvConfig, LevelSource
 from roller_env.envs.spaces import shape_observation
+from roller_env.game.actions import DIRECTIONS
 from roller_env.physics.presets import PhysicsPreset, physics_preset
 from roller_env.problems import shown
 from roller_env.simulation import Simulation
 from roller_env.training.files import RunError
-from roller_env.training.policy import Policy, TrainedPolicy, load_policy
+from roller_env.training.policy import TrainedPolicy, load_policy
+
+
+@dataclass(frozen=True, slots=True)
+class Insight:
+    """What an agent saw and thought at its last decision.
+
+    Attributes:
+        entries: the observation by name, as the environment gives it.
+        actions: the names of the actions it chooses from; none if they are not of a finite number.
+        probabilities: of each of them, in its own judgement.
+        value: what it expects to be rewarded with from here on, discounted.
+    """
+
+    entries: dict[str, list[float]]
+    actions: tuple[str, ...]
+    probabilities: list[float]
+    value: float
 
 
 class Autopilot:
-    """Asks a policy for actions; a `roller_env.play.session.Player`."""
+    """Asks a policy for actions; a `roller_env.play.session.Player`.
 
-    def __init__(self, policy: Policy, steps_per_action: int):
-        """Make a player of a policy.
+    Attributes:
+        policy: the policy.
+    """
 
-        Args:
-            policy: from observations to actions, leading axis of one row.
-            steps_per_action: control steps of the game for which an action holds.
-        """
-        self._policy = policy
-        self._steps_per_action = steps_per_action
-        self._action: Any = None
+    def __init__(self, policy: TrainedPolicy):
+        """Make a player of a policy."""
+        self.policy = policy
 
     def reset(self) -> None:
-        """Forget the action of the episode before."""
-        self._action = None
+        """Nothing: it remembers nothing."""
 
     def __call__(self, simulation: Simulation) -> Any:
         """Return the action for the next control step."""
-        if self._action is None or int(simulation.state.steps[0]) % self._steps_per_action == 0:
-            observation = shape_observation(
-                simulation.config, simulation.entries, simulation.observe()
-            )
-            self._action = self._policy(observation)[0]
-        return self._action
+        return self.policy(self._observation(simulation))[0]
+
+    def insight(self, simulation: Simulation) -> Insight:
+        """Return what it sees and thinks of a game as it stands."""
+        probabilities, value = self.policy.judge(self._observation(simulation))
+        vector, entries, first = simulation.observe()[0].tolist(), {}, 0
+        for entry in simulation.entries:
+            entries[entry.name] = vector[first : first + entry.size]
+            first += entry.size
+        names = tuple(held.upper() or "none" for held in DIRECTIONS)
+        return Insight(
+            entries=entries,
+            actions=names if probabilities is not None else (),
+            probabilities=[] if probabilities is None else probabilities[0].tolist(),
+            value=float(value[0]),
+        )
+
+    def _observation(self, simulation: Simulation) -> Any:
+        return shape_observation(simulation.config, simulation.entries, simulation.observe())
 
 
 def load_autopilot(
@@ -69,16 +96,10 @@ def load_autopilot(
     trained = policy.config.evaluation_environment
     if trained.observation == "pixels":
         raise RunError(f"{shown(run)}: its agent looks at pictures, which a page does not give it")
-    preset = physics_preset(physics or trained.physics)
-    per_action = max(1, round(trained.control_dt_s / preset.dt_s))
-    limit = trained.max_episode_steps
     config = replace(
         trained,
         level=level or trained.level,
-        physics=preset,
-        control_dt_s=preset.dt_s,
-        # What is counted in control steps: the same time in the finer ones.
-        max_episode_steps=None if limit is None else limit * per_action,
+        physics=physics_preset(physics or trained.physics),
         num_threads=1,
     )
-    return config, Autopilot(policy, per_action)
+    return config, Autopilot(policy)

@@ -1,259 +1,261 @@
-"""PlayScene: a level as MuJoCo Studio draws it.
+"""A level as pages draw it: what is seen of it as plain data, sent once; frames say what changes.
 
-Studio sends a model to the browser once, and then in every frame only the state of its physics.
-What changes in any other way - coins that turn and vanish, the bands on tubes and panes, the
-colours that tell a state - is therefore made a puppet here: a body without physics (MuJoCo's mocap)
-that is put where it is seen, or away. A piece that changes its material has a puppet for each. The
-finish's particles and the effects change their size, and are sent as loose geoms.
-
-How everything looks is still decided in one place, `roller_env.drawing.stage`: a stage is kept and
-asked, and no number of it is repeated here.
+Nothing is decided here about how anything looks: pieces say it in `roller_env.pieces.look`, and
+solids get their surfaces in `roller_env.pieces.surfaces`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import Any, Final, Literal, NamedTuple
+import base64
+import gzip
+import hashlib
+import json
+from collections import defaultdict
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Any, Final
 
-import mujoco
 import numpy as np
+import numpy.typing as npt
 
-from roller_env.arrays import Bool, Float64, Int64
-from roller_env.compile.mjcf import BALL, build_spec
-from roller_env.compile.scenery import add_scenery
-from roller_env.drawing.renderer import FIELD_OF_VIEW_DEG
-from roller_env.drawing.stage import SEEN_FROM_BELOW_ALPHA, Stage
-from roller_env.game.cameras import MODE_BELOW, MODE_FIRST_PERSON
+from roller_env.arrays import Bool, Float64
+from roller_env.compile.merge import merge_solids
+from roller_env.compile.mjcf import quaternion
 from roller_env.game.state import GameState
-from roller_env.level.expand import shapes
+from roller_env.game.tables import LevelTable
+from roller_env.level.expand import expand, shapes
 from roller_env.level.schema import Level
-from roller_env.physics.presets import PhysicsPreset
-from roller_env.pieces.look import Fly, Shape, part
-from roller_env.play.effects import Light
+from roller_env.pieces.coin import coin_shapes
+from roller_env.pieces.look import METAL, Paint, Shape
+from roller_env.pieces.piece import Mover, Piece, Solid, number_of
+from roller_env.pieces.surfaces import Surface, solid_surfaces
+from roller_env.replay.contents import canonical_text
 
-BALL_GROUP: Final = 2
-"""Geom group of the ball, which is not seen in first person."""
-
-GLASS_GROUP: Final = 3
-GROUND_GROUP: Final = 5
-"""Geom groups of the ground: as it is, and as glass, through which the camera below looks."""
-
-_PHYSICS_GROUP: Final = 4
-
-AWAY: Final = (0.0, 0.0, -10_000.0)
-"""Where puppets are that are not seen: far beyond what is drawn."""
-
-WATCHING_DISTANCE_M: Final = 5.0
-
-Quality = Literal["high", "low"]
-
-RENDERING: Final[dict[str, float]] = {
-    "filament.fallback.environment_light_intensity": 12_000.0,
-    "filament.fallback.scene_light_intensity": 36_000.0,
-    "filament.fallback.head_light_intensity": 1_000.0,
-    "filament.cg.exposure": -0.1,
-    "filament.cg.contrast": 1.25,
-    "filament.cg.saturation": 1.1,
-    "filament.phong.specular_multiplier": 0.4,
-}
-"""Light and colour for Filament, Studio's renderer, found by eye; its manual, in MuJoCo's package,
-is `doc/programming/rendering.rst`."""
-
-LOW_RENDERING: Final[dict[str, float]] = {
-    "filament.ao.enabled": 0.0,
-    # As nothing lies in the shade, the sun is to be weaker.
-    "filament.fallback.scene_light_intensity": 27_000.0,
-}
-"""What a machine without a graphics processor is spared, besides shadows and smooth edges."""
+FORMAT: Final = 1
 
 
-class _Puppet(NamedTuple):
-    """A geom of the stage, and the material in which this puppet of it is made."""
-
-    geom: str
-    material: str
-
-
-class PlayScene:
-    """A level's model for Studio, and what it takes to put it into the state of a game.
+class Machine:
+    """A piece whose look changes with what it is doing.
 
     Attributes:
-        model: what Studio is given; nothing in it changes while playing.
+        kind: of piece, such as ``plate``.
+        name: what the level calls it.
     """
 
-    def __init__(self, level: Level, preset: PhysicsPreset, quality: Quality = "high"):
-        """Build what Studio draws of ``level``."""
-        self._stage = Stage(level, preset)
-        spec = build_spec(level, preset)
-        add_scenery(spec, level)
-        seen = list(shapes(level))
-        particles = [shape.name for shape in seen if isinstance(shape.motion, Fly)]
-        puppets = _make_puppets(spec, seen)
-        _add_glass_ground(spec)
-        for name in particles:  # they change their size, which no body can
-            spec.delete(spec.geom(name))
-        spec.geom(BALL).group = BALL_GROUP
-        _set_rendering(spec, quality)
-        _aim_free_camera(spec, level)
-        self.model: mujoco.MjModel = spec.compile()
-        # Nothing is simulated with it: what mj_forward need not find it should not look for.
-        self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-        stage = self._stage.model
-        self._geoms = _indices(stage.geom(puppet.geom).id for puppet in puppets)
-        self._materials = _indices(stage.material(puppet.material).id for puppet in puppets)
-        bodies = [self.model.body(_puppet_name(puppet)) for puppet in puppets]
-        self._mocaps = _indices(body.mocapid[0] for body in bodies)
-        geoms = _indices(body.geomadr[0] for body in bodies)
-        # Compiling has moved meshes to their middles and turned them along their main axes.
-        self._offsets = self.model.geom_pos[geoms].copy()
-        self._turns = _matrices(self.model.geom_quat[geoms])
-        self._sparks = [stage.geom(name).id for name in particles]
-
-    def groups(self, mode: int) -> list[int]:
-        """Return which geom groups of the model are seen in camera mode ``mode``, 0 or 1 each."""
-        hidden = {_PHYSICS_GROUP, GROUND_GROUP if mode == MODE_BELOW else GLASS_GROUP}
-        if mode == MODE_FIRST_PERSON:
-            hidden.add(BALL_GROUP)
-        return [int(group not in hidden) for group in range(mujoco.mjNGROUP)]
-
-    def show(self, data: mujoco.MjData, qpos: Float64, state: GameState, clock_s: float) -> None:
-        """Put ``data``, of `model`, into the state of a game.
+    def __init__(self, piece: Piece, number: int, mover: int, stop: float):
+        """Make it of a piece, the ``number``-th of its kind.
 
         Args:
-            data: changed: ``qpos`` and the poses of the puppets.
-            qpos: (nq,) positions of the game, as drawn.
-            state: of one game.
-            clock_s: the time that coins turn and particles fly by.
+            piece: the piece.
+            number: its own among those of its kind.
+            mover: number of what moves of it among the level's movers; -1 for nothing.
+            stop: displacement at which that has arrived, metres.
         """
-        stage = self._stage
-        stage.show(qpos, state, 0, clock_s)
-        data.qpos[:] = qpos
-        seen: Bool = stage.model.geom_rgba[self._geoms, 3] > 0.0
-        seen &= stage.model.geom_matid[self._geoms] == self._materials
-        turns = stage.data.geom_xmat[self._geoms].reshape(-1, 3, 3) @ self._turns.swapaxes(1, 2)
-        places = stage.data.geom_xpos[self._geoms] - np.einsum("nij,nj->ni", turns, self._offsets)
-        data.mocap_pos[self._mocaps] = np.where(seen[:, None], places, AWAY)
-        for mocap, turn in zip(self._mocaps[seen], turns[seen], strict=True):
-            mujoco.mju_mat2Quat(data.mocap_quat[mocap], turn.ravel())
-        # A window draws what the kinematics say; a browser computes them itself.
-        mujoco.mj_kinematics(self.model, data)
-        mujoco.mj_camlight(self.model, data)
+        self.kind = piece.rules.name if piece.rules is not None else type(piece).__name__.lower()
+        self.name = str(getattr(piece, "name", ""))
+        self._piece, self._number = piece, number
+        self._mover, self._stop = mover, stop
 
-    def loose_geoms(self, lights: Iterable[Light] = ()) -> list[mujoco.MjvGeom]:
-        """Return what to draw besides the model, as `show` was last told: particles and lights."""
-        model, data = self._stage.model, self._stage.data
-        return [_sphere(light) for light in (*self._spark_lights(model, data), *lights)]
-
-    def _spark_lights(self, model: Any, data: Any) -> Iterator[Light]:
-        for geom in self._sparks:
-            red, green, blue, alpha = model.geom_rgba[geom].tolist()
-            if alpha > 0.0:
-                x, y, z = data.geom_xpos[geom].tolist()
-                yield Light((x, y, z), float(model.geom_size[geom, 0]), (red, green, blue), alpha)
+    def phase(self, state: GameState, displacements: Float64) -> int:
+        """Return what it is doing in a game: IDLE, ACTIVE or DONE of `roller_env.pieces.look`."""
+        arrived = self._mover >= 0 and bool(displacements[self._mover] <= self._stop)
+        return self._piece.phase(state, 0, self._number, arrived)
 
 
-def _sphere(light: Light) -> mujoco.MjvGeom:
-    geom = mujoco.MjvGeom()
-    mujoco.mjv_initGeom(
-        geom,
-        mujoco.mjtGeom.mjGEOM_SPHERE.value,
-        np.array([light.radius_m, 0.0, 0.0]),
-        np.array(light.position),
-        _UPRIGHT,
-        np.array([*light.colour, light.alpha], dtype=np.float32),
-    )
-    geom.emission = 1.0
-    return geom
+class Scene:
+    """A level as pages draw it.
 
+    Attributes:
+        level: the level.
+        hash: of all that the scene is made of; scenes with the same one are the same.
+        machines: the pieces of which frames tell the phase.
+        coins: how many there are.
+        slots: of each of the level's movers, which slab of the simulation's it is.
+    """
 
-_UPRIGHT: Final = np.eye(3).ravel()
+    def __init__(self, level: Level):
+        """Find what is to be seen of ``level``."""
+        everything = expand(level)
+        self.level = level
+        self.hash = hashlib.sha256(f"{FORMAT} {canonical_text(level)}".encode()).hexdigest()[:16]
+        self.coins = len(everything.coins)
+        self.slots = LevelTable.of_levels([level]).slots([level])[0]
+        self.machines: list[Machine] = []
+        self._machine_of: dict[str, int] = {}
+        self._mover_of = {mover.name: i for i, mover in enumerate(everything.movers)}
+        of_source = {mover.solid.source: mover for mover in everything.movers}
+        for source, piece in level.pieces():
+            number = number_of(source)
+            changing = [shape.name for shape in piece.looks(number) if shape.has_phases]
+            if changing:
+                self._machine_of.update(dict.fromkeys(changing, len(self.machines)))
+                self.machines.append(self._machine(piece, number, of_source.get(source)))
 
+    def phases(self, state: GameState, displacements: Float64) -> list[int]:
+        """Return what the machines are doing in a game.
 
-def _make_puppets(spec: mujoco.MjSpec, seen: Iterable[Shape]) -> list[_Puppet]:
-    """Put a puppet for every paint in the place of each shape that changes; return them."""
-    puppets = []
-    for shape in seen:
-        if isinstance(shape.motion, Fly) or not (shape.motion or shape.has_phases):
-            continue
-        geom = spec.geom(shape.name)
-        for material in shape.materials:
-            puppet = _Puppet(shape.name, material)
-            body = spec.worldbody.add_body(name=_puppet_name(puppet), mocap=True, pos=AWAY)
-            _copy_geom(geom, body, material)
-            puppets.append(puppet)
-        spec.delete(geom)
-    return puppets
+        Args:
+            state: of one row.
+            displacements: (M,) metres, in the order of the level's movers.
+        """
+        return [machine.phase(state, displacements) for machine in self.machines]
 
+    @cached_property
+    def content(self) -> bytes:
+        """The scene as JSON, compressed by gzip: always the same bytes for the same level."""
+        text = json.dumps(self._data(), separators=(",", ":"), allow_nan=False)
+        return gzip.compress(text.encode(), mtime=0)
 
-def _puppet_name(puppet: _Puppet) -> str:
-    return f"{puppet.geom} {puppet.material}"
+    def _machine(self, piece: Piece, number: int, mover: Mover | None) -> Machine:
+        if mover is None:
+            return Machine(piece, number, -1, 0.0)
+        return Machine(piece, number, self._mover_of[mover.name], mover.stop)
 
-
-def _copy_geom(geom: Any, body: Any, material: str, **changes: Any) -> None:
-    """Add to a body a geom that looks the same and touches nothing."""
-    body.add_geom(
-        **{
-            "type": geom.type,
-            "size": geom.size,
-            "meshname": geom.meshname,
-            "material": material,
-            "group": geom.group,
-            "castshadow": geom.castshadow,
-            "contype": 0,
-            "conaffinity": 0,
-            "mass": 0.0,
-            **changes,
-        }
-    )
-
-
-def _add_glass_ground(spec: mujoco.MjSpec) -> None:
-    """Add to every surface of the ground the same one in glass."""
-    for geom in [geom for geom in spec.worldbody.geoms if geom.name.startswith(part("ground"))]:
-        geom.group = GROUND_GROUP
-        solid = spec.material(geom.material)
-        glass = spec.add_material(
-            name=solid.name + " as glass",
-            rgba=[1.0, 1.0, 1.0, SEEN_FROM_BELOW_ALPHA],
-            specular=solid.specular,
-            shininess=solid.shininess,
+    def _data(self) -> dict[str, Any]:
+        level, everything = self.level, expand(self.level)
+        surfaces = _Surfaces()
+        drawn = [*self._machine_shapes(surfaces), *self._shapes(surfaces)]
+        ground = list(self._ground(surfaces))
+        corners = np.concatenate(
+            [np.array([level.start.at]), *(solid.corners() for solid in everything.at_the_start)]
         )
-        role = mujoco.mjtTextureRole.mjTEXROLE_RGB
-        glass.textures[role] = solid.textures[role]
-        _copy_geom(geom, spec.worldbody, glass.name, group=GLASS_GROUP, castshadow=False)
+        paints = {paint.name: paint for shape in shapes(level) for paint in shape.paints}
+        paints[METAL.name] = METAL
+        return {
+            "format": FORMAT,
+            "name": level.name,
+            "title": level.title or level.name,
+            "description": level.description,
+            "hash": self.hash,
+            "par_time_s": level.par_time_s,
+            "coins": self.coins,
+            "ball_radius": level.ball.radius,
+            "start": list(level.start.at),
+            "low": corners.min(axis=0).tolist(),
+            "high": corners.max(axis=0).tolist(),
+            "materials": {
+                name: {"colour": material.colour, "pattern": material.pattern}
+                for name, material in self._materials().items()
+            },
+            "paints": {
+                name: _paint(paint) for name, paint in {METAL.name: METAL, **paints}.items()
+            },
+            "surfaces": surfaces.data,
+            "ground": ground,
+            "movers": [{"name": m.name, "along": list(m.along)} for m in everything.movers],
+            "shapes": drawn,
+            "machines": [{"kind": m.kind, "name": m.name} for m in self.machines],
+            "labels": [
+                {"text": label[0], "at": list(label[1])}
+                for _, piece in level.pieces()
+                if (label := piece.label()) is not None
+            ],
+        }
+
+    def _materials(self) -> dict[str, Any]:
+        named = {solid.material for solid in expand(self.level).decks}
+        named |= {str(shape.paint) for shape in shapes(self.level) if not shape.paints}
+        return {name: self.level.material(name) for name in sorted(named)}
+
+    def _ground(self, surfaces: _Surfaces) -> Iterator[dict[str, Any]]:
+        """Yield the surfaces of what stands still and does nothing: one for each material."""
+        by_material: dict[str, list[Solid]] = defaultdict(list)
+        for solid in merge_solids(expand(self.level).decks):
+            by_material[solid.material].append(solid)
+        for name, pieces in by_material.items():
+            faces, edges = zip(*map(solid_surfaces, pieces), strict=True)
+            there = [edge for edge in edges if edge is not None]
+            yield {"surface": surfaces.add(Surface.joined(faces)), "material": name, "part": "face"}
+            if there:
+                edge = surfaces.add(Surface.joined(there))
+                yield {"surface": edge, "material": name, "part": "edge"}
+
+    def _machine_shapes(self, surfaces: _Surfaces) -> Iterator[dict[str, Any]]:
+        """Yield the bodies of what does something, which are of metal."""
+        everything = expand(self.level)
+        still = [(solid, "") for solid in everything.machines]
+        moving = [(mover.solid, mover.name) for mover in everything.movers]
+        for solid, carrier in [*still, *moving]:
+            box = type(solid) is Solid
+            form = "box" if box else surfaces.add(solid_surfaces(solid)[0])
+            at = solid.centre if box else (0.0, 0.0, 0.0)
+            yield {
+                **self._shape_data(Shape("", "box", (METAL,), solid.half_size, at)),
+                "form": form,
+                "rotation": _quaternion(solid.rotation) if box else [1.0, 0.0, 0.0, 0.0],
+                "mover": self._mover_of.get(carrier, -1),
+            }
+
+    def _shapes(self, surfaces: _Surfaces) -> Iterator[dict[str, Any]]:
+        everything = expand(self.level)
+        coin_of = {shape.name: i for i, shape in enumerate(coin_shapes(everything.coins))}
+        for shape in shapes(self.level):
+            data = self._shape_data(shape)
+            if isinstance(shape.form, Surface):
+                data["form"] = surfaces.add(shape.form)
+            data["coin"] = coin_of.get(shape.name, -1)
+            if shape.carrier:
+                carrier = everything.movers[self._mover_of[shape.carrier]].solid
+                turn = np.array(carrier.rotation)
+                data["at"] = (turn @ shape.at + carrier.centre).tolist()
+                data["rotation"] = _quaternion(turn @ np.array(shape.rotation))
+            yield data
+
+    def _shape_data(self, shape: Shape) -> dict[str, Any]:
+        motion = shape.motion
+        return {
+            "form": shape.form,
+            "size": list(shape.size),
+            "at": list(shape.at),
+            "rotation": _quaternion(shape.rotation),
+            "look": list(shape.materials),
+            "is_material": not shape.paints,
+            "mover": self._mover_of.get(shape.carrier, -1),
+            "machine": self._machine_of.get(shape.name, -1),
+            "coin": -1,
+            "seen_in": list(shape.seen_in),
+            "motion": motion and {"kind": type(motion).__name__.lower(), **motion._asdict()},
+        }
 
 
-def _set_rendering(spec: mujoco.MjSpec, quality: Quality) -> None:
-    spec.visual.global_.fovy = FIELD_OF_VIEW_DEG
-    # Filament shares out one intensity among all lights: let the sun have it.
-    spec.delete(spec.light("sky light/"))
-    settings = dict(RENDERING)
-    if quality == "low":
-        settings |= LOW_RENDERING
-        spec.light("sun/").castshadow = False
-        spec.visual.quality.offsamples = 0
-    for name, value in settings.items():
-        spec.add_numeric(name=name, data=[value], size=1)
+class _Surfaces:
+    """The surfaces of a scene, each once."""
+
+    def __init__(self) -> None:
+        self.data: list[dict[str, str]] = []
+        self._known: dict[int, tuple[int, Surface]] = {}
+
+    def add(self, surface: Surface) -> int:
+        """Return a surface's number."""
+        if id(surface) not in self._known:
+            # Kept, so that no other surface gets its identity.
+            self._known[id(surface)] = (len(self.data), surface)
+            self.data.append(
+                {
+                    "vertices": _base64(surface.vertices, "<f4"),
+                    "normals": _base64(surface.normals, "<f4"),
+                    "texture": _base64(surface.texture, "<f4"),
+                    "faces": _base64(surface.faces, "<u4"),
+                }
+            )
+        return self._known[id(surface)][0]
 
 
-def _aim_free_camera(spec: mujoco.MjSpec, level: Level) -> None:
-    """Let the camera of whoever watches begin above and behind the start, looking forward."""
-    visual, before = spec.visual, spec.stat.extent
-    # Its distance is one and a half of this; what is given in extents stays where it was.
-    spec.stat.extent = WATCHING_DISTANCE_M / 1.5
-    visual.map.znear *= before / spec.stat.extent
-    visual.map.zfar *= before / spec.stat.extent
-    spec.stat.center = level.start.at
-    visual.global_.azimuth, visual.global_.elevation = 0.0, -30.0
+def _base64(array: npt.NDArray[Any], dtype: str) -> str:
+    return base64.b64encode(np.ascontiguousarray(array, dtype=dtype).tobytes()).decode()
 
 
-def _matrices(quaternions: Float64) -> Float64:
-    """Return the rotation matrices, (N, 3, 3), of unit quaternions (N, 4)."""
-    matrices = np.empty((len(quaternions), 9))
-    for quaternion, matrix in zip(quaternions, matrices, strict=True):
-        mujoco.mju_quat2Mat(matrix, quaternion)
-    return matrices.reshape(-1, 3, 3)
+def _quaternion(rotation: Any) -> list[float]:
+    found: list[float] = quaternion(np.asarray(rotation, dtype=np.float64)).tolist()
+    return found
 
 
-def _indices(numbers: Iterable[int]) -> Int64:
-    return np.fromiter(numbers, dtype=np.int64)
+def _paint(paint: Paint) -> dict[str, Any]:
+    data = paint._asdict()
+    del data["name"]
+    return data
+
+
+def coin_bits(taken: Bool) -> bytes:
+    """Return flags of coins, (K,), as bits: coin i is bit i % 8 of byte i // 8."""
+    return np.packbits(taken, bitorder="little").tobytes()

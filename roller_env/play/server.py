@@ -1,74 +1,69 @@
-"""Where the game is shown: a browser page that this machine serves, or a window.
+"""The game's page and its server: this machine serves it, a browser shows it.
 
-MuJoCo Studio's web server has no password. As it comes it listens on all interfaces and takes
-WebSockets from pages of any origin; here it listens on this machine's loopback address only, and
-then takes them only from pages that this machine served, so that a page from elsewhere, open in
-the same browser, cannot reach the game either.
-
-Of the browsers that watch, Studio lets each take the controls from the one that has them ("Steal
-control" in its bar). Here that is not heard: they can ask, and are next when the player gives the
-controls up or is gone.
-
-Panels are sent as changes, of which a page can leave none out, 60 times a second, and it takes a
-bounded number of them for each picture that it draws. A page that draws slowly, as where software
-draws beside other work, falls ever further behind: after 15 s in which it drew nothing, its panels
-came right with the 44th picture. Here the page says when the next ones are due: it tells its keys
-once for every picture. (Read and tried with MuJoCo 4.0.0.)
+There is no password. By default it listens on this machine's loopback address only, and then lets
+in only pages that this machine served: a page from elsewhere, open in the same browser, cannot
+reach the game.
 """
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import errno
-import functools
+import itertools
+import json
 import re
 import signal
 import socket
-import sys
-import threading
-from collections.abc import AsyncIterator, Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections import deque
+from collections.abc import Awaitable, Callable, Iterator
 from typing import Any, Final
+from urllib.parse import urlsplit
 
-from mujoco.studio import launch_thread, messages, plugin, viewer_handle, viewer_protocol
+import uvicorn
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.middleware.gzip import GZipMiddleware
+from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from roller_env.assets import asset_directory
+from roller_env.play.room import Message, Room
+from roller_env.play.wire import MAX_MESSAGE_BYTES, read_message
 
 LOOPBACK: Final = "127.0.0.1"
 DEFAULT_PORT: Final = 8080
-TITLE: Final = "Roller"
-
-LOCAL_ORIGINS: Final = (
-    re.compile(r"http://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?"),
-    # What is no browser sends no origin, and could send any.
-    None,
-)
-"""Origins of pages that this machine served: a tunnel's other end may have another port."""
-
 MAX_PORT: Final = 65535
+MAX_GUESTS: Final = 16
+"""Browsers at once; each further one is turned away."""
 
-NATIVE_PYTHON: Final = (3, 12)
-"""Studio's window imports `collections.abc.Buffer`, which Python has since 3.12."""
+MAX_WAITING: Final = 256
+"""Messages that may wait for one browser: one that takes none for so long is sent away."""
 
-NATIVE_GRAPHICS: Final = "opengl_headless"
-"""The window shows pictures drawn off screen: to draw into the window itself ("opengl") fails in
-MuJoCo 4.0.0, in an empty scene too, with "Target not found"."""
+_LOCAL_HOSTS: Final = ("localhost", "127.0.0.1", "[::1]")
+_LOCAL_ORIGIN: Final = re.compile(r"http://(localhost|127\.0\.0\.1|\[::1\])(:\d+)?")
+"""Of pages that this machine served: a tunnel's other end may have another port."""
 
-NATIVE_NOTE: Final = (
-    "note: MuJoCo 4.0.0's window shows the level but, where it was tried, neither panels nor sky; "
-    "Enter starts the game. The page (--viewer web) shows all of it."
+_POLICY: Final = (
+    "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; "
+    "connect-src 'self' ws: wss:; worker-src 'self' blob:; frame-ancestors 'none'"
 )
+"""Content Security Policy: the page asks no other host for anything."""
 
-STALE_PAGE_S: Final = 0.1
-"""How often a page that draws nothing is sent what is new: so seldom that it can catch up, and more
-often than the game lets go of keys of which it hears nothing."""
-
-Plugins = Sequence[plugin.Plugin]
+_UNWANTED, _FULL, _SLOW = 1008, 1013, 1008
+"""WebSocket close codes (RFC 6455): what was sent is not allowed; try again later."""
 
 
 class PlayError(RuntimeError):
     """The game cannot be shown; the message says why and what helps."""
 
 
-def check_address(host: str, port: int) -> None:
-    """Refuse, before anything is loaded, an address on which no page could be served.
+def listen(host: str, port: int) -> socket.socket:
+    """Return a socket that listens, so that nothing is loaded for a page that cannot be served.
 
     Args:
         host: address of the interface to listen on.
@@ -79,149 +74,31 @@ def check_address(host: str, port: int) -> None:
     """
     if not 0 <= port <= MAX_PORT:
         raise PlayError(f"port: found {port}; must be a whole number from 0 to {MAX_PORT}")
-    try:
-        with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
-            # As Studio's server does, so that a port is free that somebody has just left.
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind((host, port))
-    except OSError as error:
-        where, hint = f"host {host!r}", "--host says where to listen"
-        if error.errno in (errno.EADDRINUSE, errno.EACCES):
-            where, hint = f"port {port} of {host}", "--port 0 takes a free one"
-        raise PlayError(f"{where}: {error.strerror}; {hint}") from None
-
-
-def open_page(
-    plugins: Plugins, *, port: int = 0, host: str = LOOPBACK
-) -> viewer_handle.ViewerHandle:
-    """Serve the game's page from a thread and return Studio's handle of it.
-
-    Args:
-        plugins: the game's, of `roller_env.play.app`.
-        port: to listen on; 0 takes the first free one from 8080.
-        host: address of the interface to listen on. Others than the loopback let everybody who
-            can reach it watch, play, and see the log.
-    """
-    # Imported here: a window needs none of it.
-    from mujoco.studio import web_viewer
-    from mujoco.studio.web import web_server
-
-    origins = LOCAL_ORIGINS if host == LOOPBACK else None
-
-    class PageViewer(web_viewer.WebViewer):
-        """Studio's web viewer, bound to one address."""
-
-        @property
-        def _host(self) -> str:
-            return host
-
-        @_host.setter
-        def _host(self, _: str) -> None:
-            """Studio wants all interfaces, without asking: no."""
-
-        def _start_server(self) -> None:
-            self._page_drew = threading.Event()
-            taking = web_server._SessionMessage.FORCE_CONTROL
-            # Imported there from websockets, and called by that name.
-            web_server.serve = _serving(  # type: ignore[attr-defined]
-                taking, self._page_drew.set, origins
-            )
-            super()._start_server()
-
-        def prepare_next_frame(self) -> bool:
-            """Wait for the page, but not for long."""
-            self._page_drew.wait(STALE_PAGE_S)
-            self._page_drew.clear()
-            return bool(super().prepare_next_frame())
-
-    def view(config: Any, endpoint: Any, viewers: Any) -> None:
-        viewer_protocol.run_viewer_loop(PageViewer(config, endpoint, plugins=viewers))
-
-    return _launch(view, plugins, viewer_protocol.ViewerConfig(title=TITLE, http_port=port))
-
-
-def open_window(plugins: Plugins) -> viewer_handle.ViewerHandle:
-    """Open a window with the game and return Studio's handle of it.
-
-    Raises:
-        PlayError: this Python is too old for Studio's window, or there is no window system.
-    """
-    if sys.version_info < NATIVE_PYTHON:
-        found = ".".join(map(str, sys.version_info[:3]))
-        raise PlayError(
-            f"a window needs Python 3.12 or newer (MuJoCo Studio's does), and this is {found}; "
-            "the browser page works here: --viewer web"
-        )
-    try:
-        from mujoco.studio import native_viewer
-    except ImportError as error:
-        raise PlayError(f"MuJoCo Studio's window does not load here: {error}") from error
-
-    class WindowViewer(native_viewer.NativeViewer):
-        """Studio's window, which survives a change of the level.
-
-        To destroy a scene that has been drawn crashes in MuJoCo 4.0.0: scenes of levels that were
-        left are kept until the window is closed.
-        """
-
-        def __init__(self, *arguments: Any, **options: Any) -> None:
-            self._left: list[Any] = []
-            super().__init__(*arguments, **options)
-
-        def _sync_renderer(self, model: Any) -> None:
-            if id(model) != self._renderer_model_id:
-                self._left.append((self._model_scene, self._renderer._scenes.pop("scn", None)))
-            super()._sync_renderer(model)
-
-        def close(self) -> None:
-            self._left.clear()
-            super().close()
-
-    def view(config: Any, endpoint: Any, viewers: Any) -> None:
-        viewer_protocol.run_viewer_loop(WindowViewer(config, endpoint, plugins=viewers))
-
-    return _launch(view, plugins, viewer_protocol.ViewerConfig(title=TITLE, gfx=NATIVE_GRAPHICS))
-
-
-def run(handle: viewer_handle.ViewerHandle, ended: Callable[[], bool] = lambda: False) -> None:
-    """Let the game run until its window is closed, Ctrl+C is pressed, or ``ended`` says so.
-
-    A terminal that is closed and a request to terminate end it as Ctrl+C does: between two steps.
-
-    Raises:
-        RuntimeError: the page cannot be served, such as on a port that is taken.
-    """
-    with handle, _signals_between_steps() as asked_to_end:
-        handle.dispatch(messages.LoadModelEvent(path=""))
+    candidates = [port] if port else itertools.chain(range(DEFAULT_PORT, DEFAULT_PORT + 100), [0])
+    for candidate in candidates:
         try:
-            while not asked_to_end.is_set() and not ended() and handle.is_running():
-                handle.sync()
-        except KeyboardInterrupt:
-            asked_to_end.set()
-        if asked_to_end.is_set():
-            print("\nGood bye.", flush=True)
+            return _bound(host, candidate)
+        except OSError as error:
+            if port == 0 and error.errno == errno.EADDRINUSE:
+                continue
+            where, hint = f"host {host!r}", "--host says where to listen"
+            if error.errno in (errno.EADDRINUSE, errno.EACCES):
+                where, hint = f"port {port} of {host}", "--port 0 takes a free one"
+            raise PlayError(f"{where}: {error.strerror}; {hint}") from None
+    raise PlayError(f"host {host!r}: no port is free")
 
 
-@contextmanager
-def _signals_between_steps() -> Iterator[threading.Event]:
-    """Let signals that end a program be kept in mind instead of interrupting what is being done.
-
-    An exception in the middle of a step would leave a ball that has moved in a game that has not,
-    and a replay of it that is of no game. The second signal of a kind interrupts.
-    """
-    asked = threading.Event()
-
-    def remember(number: int, _: object) -> None:
-        signal.signal(number, signal.default_int_handler)
-        asked.set()
-
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = {number: signal.signal(number, remember) for number in numbers}
+def _bound(host: str, port: int) -> socket.socket:
+    found = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
     try:
-        yield asked
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        # So that a port is free that somebody has just left.
+        found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        found.bind((host, port))
+        found.listen(64)
+    except OSError:
+        found.close()
+        raise
+    return found
 
 
 def warning_of(host: str) -> str | None:
@@ -230,45 +107,230 @@ def warning_of(host: str) -> str | None:
         return None
     return (
         f"warning: listening on {host}. There is no password and no encryption: everybody who can "
-        "reach this address can watch, take the controls, and read the names of files in the log. "
+        "reach this address can watch, and play when nobody else does. "
         f"Without --host only this machine can ('ssh -L {DEFAULT_PORT}:localhost:{DEFAULT_PORT}' "
         "reaches it from another)."
     )
 
 
-def _launch(
-    view: Callable[[Any, Any, Any], None], plugins: Plugins, config: viewer_protocol.ViewerConfig
-) -> viewer_handle.ViewerHandle:
-    viewers, simulations = plugin.split_plugins(plugins)
-    return launch_thread.launch_thread(
-        lambda endpoint: view(config, endpoint, viewers), sim_plugins=simulations
+class Browser:
+    """A browser, as a guest of the room: what it is sent waits here until it takes it."""
+
+    def __init__(self, socket: WebSocket) -> None:
+        self._socket = socket
+        self._waiting: deque[str] = deque()
+        self._frame: bytes | None = None
+        self._something = asyncio.Event()
+        self.is_slow = False
+
+    def tell(self, told: Message) -> None:
+        """Send a message, sooner or later."""
+        if len(self._waiting) >= MAX_WAITING:
+            self.is_slow = True
+        else:
+            self._waiting.append(json.dumps(told, separators=(",", ":"), allow_nan=False))
+        self._something.set()
+
+    def show(self, frame: bytes) -> None:
+        """Send a frame, or leave it out if the next one comes first."""
+        self._frame = frame
+        self._something.set()
+
+    async def send(self) -> None:
+        """Send what there is, for as long as the browser takes it."""
+        while not self.is_slow:
+            await self._something.wait()
+            self._something.clear()
+            while self._waiting:
+                await self._socket.send_text(self._waiting.popleft())
+            frame, self._frame = self._frame, None
+            if frame is not None:
+                await self._socket.send_bytes(frame)
+        await self._socket.close(_SLOW, "takes nothing of what it is sent")
+
+    async def receive(self, room: Room) -> None:
+        """Hear what the browser asks for, until it asks for something that it may not."""
+        while True:
+            received = await self._socket.receive()
+            if received["type"] == "websocket.disconnect":
+                return
+            try:
+                wish = read_message(received.get("text") or "")
+            except ValueError:
+                await self._socket.close(_UNWANTED, "no message of this game")
+                return
+            room.hear(self, wish)
+
+
+def make_app(room: Room, host: str = LOOPBACK) -> Starlette:
+    """Return the application that serves a room.
+
+    Args:
+        room: the game and who is there.
+        host: address that is listened on: on the loopback's only pages of this machine are let in.
+    """
+    page = asset_directory("page")
+    guests: set[Browser] = set()
+
+    async def index(request: Request) -> Response:
+        headers = {"Content-Security-Policy": _POLICY, "Cache-Control": "no-cache"}
+        return FileResponse(page / "index.html", headers=headers)
+
+    async def scene(request: Request) -> Response:
+        known = room.scene
+        if known is None or request.path_params["name"] != known.hash:
+            return Response("there is no such scene", 404)
+        headers = {"Content-Encoding": "gzip", "Cache-Control": "max-age=31536000, immutable"}
+        return Response(known.content, media_type="application/json", headers=headers)
+
+    async def game(socket: WebSocket) -> None:
+        if not _is_welcome(socket, host):
+            await socket.close(_UNWANTED)
+            return
+        await socket.accept()
+        if len(guests) >= MAX_GUESTS:
+            await socket.close(_FULL, f"there are {MAX_GUESTS} browsers already")
+            return
+        browser = Browser(socket)
+        guests.add(browser)
+        room.enter(browser)
+        try:
+            await _first_of(browser.send(), browser.receive(room))
+        finally:
+            guests.discard(browser)
+            room.leave(browser)
+
+    def files(kind: Any) -> StaticFiles:
+        return StaticFiles(directory=asset_directory(kind))
+
+    middleware = [Middleware(GZipMiddleware)]
+    if host == LOOPBACK:
+        middleware.append(Middleware(TrustedHostMiddleware, allowed_hosts=list(_LOCAL_HOSTS)))
+    return Starlette(
+        routes=[
+            Route("/", index),
+            Route("/scene/{name}.json", scene),
+            WebSocketRoute("/ws", game),
+            Mount("/pictures", files("pictures")),
+            Mount("/sounds", files("sounds")),
+            Mount("/", files("page")),
+        ],
+        middleware=middleware,
     )
 
 
-def _serving(taking: str, page_drew: Callable[[], None], origins: Sequence[Any] | None) -> Any:
-    """Return what serves WebSockets in the place of `websockets`' own ``serve``.
+def _is_welcome(socket: WebSocket, host: str) -> bool:
+    """Say whether a browser's page is one that this machine served.
+
+    What is no browser sends no origin, and could send any.
+    """
+    origin = socket.headers.get("origin")
+    if origin is None:
+        return True
+    if host == LOOPBACK:
+        return _LOCAL_ORIGIN.fullmatch(origin) is not None
+    return urlsplit(origin).netloc == socket.headers.get("host")
+
+
+async def _first_of(*doings: Awaitable[None]) -> None:
+    """Do several things until one of them ends, and leave the others."""
+    tasks = [asyncio.ensure_future(doing) for doing in doings]
+    try:
+        done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in done:
+            # That a browser is gone is how these end.
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError, OSError):
+                task.result()
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+
+class _Server(uvicorn.Server):
+    """Uvicorn's server; what a signal does is decided here."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Capture none."""
+        yield
+
+
+def serve(
+    room: Room,
+    listening: socket.socket,
+    host: str = LOOPBACK,
+    also: Callable[[], Awaitable[None]] | None = None,
+) -> None:
+    """Serve the room's page until Ctrl+C is pressed, or the program is asked to end.
+
+    A terminal that is closed and a request to terminate end it as Ctrl+C does: between two steps,
+    so that what was played is whole.
 
     Args:
-        taking: the message by which a browser takes the controls from another one.
-        page_drew: called when the player's page has drawn a picture.
-        origins: of the pages that are let in; None for any.
+        room: the game and who is there.
+        listening: of `listen`.
+        host: that it listens on.
+        also: something to do meanwhile.
+
+    Raises:
+        Exception: what the game, or ``also``, fails with.
     """
-    from websockets.asyncio.server import ServerConnection, serve
-    from websockets.typing import Data
+    asyncio.run(_serve(room, listening, host, also))
 
-    class Seat(ServerConnection):
-        """The connection of a browser that does not take the controls from another one."""
 
-        async def __aiter__(self) -> AsyncIterator[Data]:
-            async for message in super().__aiter__():
-                if message != taking:
-                    yield message
-                if isinstance(message, bytes) and self.is_of_panels:
-                    page_drew()
+async def _serve(
+    room: Room,
+    listening: socket.socket,
+    host: str,
+    also: Callable[[], Awaitable[None]] | None,
+) -> None:
+    server = _Server(
+        uvicorn.Config(
+            make_app(room, host),
+            log_level="warning",
+            ws_max_size=MAX_MESSAGE_BYTES,
+            ws_per_message_deflate=False,
+            timeout_graceful_shutdown=1,
+            lifespan="off",
+        )
+    )
+    asked = asyncio.Event()
+    with _signals(asked.set):
+        port = listening.getsockname()[1]
+        shown = "localhost" if host == LOOPBACK else host
+        print(f"The game is at http://{shown}:{port}/ (Ctrl+C ends it)", flush=True)
+        serving = asyncio.create_task(server.serve(sockets=[listening]))
+        doings = [asyncio.create_task(room.run()), asyncio.create_task(asked.wait())]
+        if also is not None:
+            doings.append(asyncio.ensure_future(also()))
+        try:
+            done, _ = await asyncio.wait([serving, *doings], return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                task.result()
+        finally:
+            room.close()
+            server.should_exit = True
+            for doing in doings:
+                doing.cancel()
+            await asyncio.gather(serving, *doings, return_exceptions=True)
+    print("\nGood bye.", flush=True)
 
-        @property
-        def is_of_panels(self) -> bool:
-            """Whether it is the player's, which tells keys and is sent panels."""
-            return self.request is not None and self.request.path.startswith("/ui")
 
-    return functools.partial(serve, origins=origins, create_connection=Seat)
+@contextlib.contextmanager
+def _signals(remember: Callable[[], object]) -> Iterator[None]:
+    """Let signals that end a program be told to ``remember``; the second of a kind interrupts."""
+    names = ("SIGINT", "SIGTERM", "SIGHUP")
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    loop = asyncio.get_running_loop()
+
+    def heard(number: int, _: object) -> None:
+        signal.signal(number, signal.default_int_handler)
+        loop.call_soon_threadsafe(remember)
+
+    before = {number: signal.signal(number, heard) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -8,7 +8,6 @@ which lies between the last two steps, is late by one of them and no more.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -24,12 +23,17 @@ from roller_env.game.result import EpisodeResult
 from roller_env.game.state import GameState
 from roller_env.level import Level
 from roller_env.physics.presets import PhysicsPreset, physics_preset
+from roller_env.play.history import History
 from roller_env.rigid_body import FixedStepPacer, Pose, interpolate
 from roller_env.simulation import Simulation, Transition
 
 MAX_CATCH_UP_S: Final = 0.1
 """Most game time that one frame may ask for. After a longer stall the game runs slower than the
 clock for that frame: it never jumps, and never asks for more than it can compute."""
+
+SLOWEST: Final = 0.05
+FASTEST: Final = 4.0
+"""Bounds of a game's speed, of the clock's."""
 
 
 class Phase(Enum):
@@ -64,6 +68,9 @@ class Observer(Protocol):
     def on_step(self, simulation: Simulation, force_n: Float64, transition: Transition) -> None:
         """A control step has been made with the keys' force ``force_n``, (1, 2) newtons."""
 
+    def on_rewind(self, simulation: Simulation) -> None:
+        """The game went back to a step before, and goes on from there."""
+
     def on_end(self, simulation: Simulation, result: EpisodeResult) -> None:
         """The episode is over, or was left; nothing more of it comes."""
 
@@ -77,11 +84,11 @@ class GameFrame:
         phase: what the game is doing.
         episode: number of this episode in the session, from 0.
         before: (7 + M,) before the last control step: the ball's centre and orientation, and the
-            slabs' displacements.
+            slabs' displacements, in the order of `Simulation.qpos`.
         after: (7 + M,) after it.
-        fraction: 0 to 1, how far between the two the picture was when the frame was made.
-        made_s: when that was, by `time.monotonic`.
-        step_s: length of a control step.
+        velocity: (3,) m/s of the ball's centre after it.
+        force_n: (2,) newtons of the keys in it.
+        fraction: 0 to 1, how far between the two the picture is.
         state: the game's, of one row.
         clock_s: time that scenery moves by; it stands still only in a pause.
         result: how the episode stands.
@@ -90,6 +97,8 @@ class GameFrame:
         falls: episodes of this session that ended in a fall.
         agent: whether there is an agent.
         agent_plays: whether it plays now.
+        speed: of the game, of the clock's.
+        practice: whether the game went back, or ran slower, in this episode.
     """
 
     level: Level
@@ -97,9 +106,9 @@ class GameFrame:
     episode: int
     before: Float64
     after: Float64
+    velocity: Float64
+    force_n: Float64
     fraction: float
-    made_s: float
-    step_s: float
     state: GameState
     clock_s: float
     result: EpisodeResult
@@ -108,19 +117,15 @@ class GameFrame:
     falls: int
     agent: bool
     agent_plays: bool
+    speed: float
+    practice: bool
 
-    def qpos(self, now_s: float | None = None) -> Float64:
-        """Return the positions to draw, (nq,): between the last two states.
+    def qpos(self) -> Float64:
+        """Return the positions to draw, (7 + M,): between the last two states.
 
         The ball's centre and the slabs by a straight line, the ball's orientation by slerp.
-
-        Args:
-            now_s: the time of the picture, by `time.monotonic`, if later than ``made_s``.
         """
-        fraction = self.fraction
-        if now_s is not None and self.phase in (Phase.INTRO, Phase.PLAYING):
-            fraction += (now_s - self.made_s) / self.step_s
-        fraction = min(max(fraction, 0.0), 1.0)
+        fraction = min(max(self.fraction, 0.0), 1.0)
         drawn = self.before + fraction * (self.after - self.before)
         poses = [Pose(qpos[None, :3], qpos[None, 3:7]) for qpos in (self.before, self.after)]
         drawn[3:7] = interpolate(poses[0], poses[1], fraction).orientation[0]
@@ -143,6 +148,8 @@ class GameSession:
         falls: episodes that ended in a fall.
         seed: of the episode under way; the simulation's generator was made of it.
         agent_plays: whether the agent, if there is one, has the ball.
+        speed: of the game, of the clock's.
+        practice: whether the game went back, or ran slower, in this episode: it is no record.
     """
 
     def __init__(
@@ -175,12 +182,14 @@ class GameSession:
         self._agent = agent
         self._observers = tuple(observers)
         self._skip_intro = skip_intro
+        self.speed = 1.0
         self._first_seed = _fresh_seed() if seed is None else seed
         self._under_way = False
         step = self.simulation.duration_s
         self._pacer = FixedStepPacer(step, max_steps=max(1, round(MAX_CATCH_UP_S / step)))
         self._scenery_s = 0.0
         self._resumes_to = Phase.PLAYING
+        self._history = History(self.simulation)
         self._begin(intro=not skip_intro)
 
     # What can be read ------------------------------------------------------------------------
@@ -211,6 +220,21 @@ class GameSession:
         return self._pacer.dropped_s
 
     @property
+    def control_dt_s(self) -> float:
+        """Length of a control step."""
+        return self.simulation.duration_s
+
+    @property
+    def moments_s(self) -> tuple[float, float]:
+        """The first and the last moment of the episode that can be shown, since its start."""
+        return 0.0, len(self._history) * self.simulation.duration_s
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether a game is under way."""
+        return self.phase in (Phase.INTRO, Phase.PLAYING)
+
+    @property
     def result(self) -> EpisodeResult:
         """How the episode stands."""
         return self.simulation.result()
@@ -224,9 +248,9 @@ class GameSession:
             episode=self.episode,
             before=self._before,
             after=self._after,
+            velocity=self.simulation.ball_velocity[0],
+            force_n=self._force_n,
             fraction=self._pacer.fraction if self.phase is not Phase.ENDED else 1.0,
-            made_s=time.monotonic(),
-            step_s=self.simulation.duration_s,
             state=state.copy_rows(),
             clock_s=self._scenery_s,
             result=self.result,
@@ -235,6 +259,8 @@ class GameSession:
             falls=self.falls,
             agent=self._agent is not None,
             agent_plays=self.agent_plays,
+            speed=self.speed,
+            practice=self.practice,
         )
 
     # What a person can do --------------------------------------------------------------------
@@ -250,18 +276,51 @@ class GameSession:
             self._begin(intro=False)
             self.phase = Phase.PLAYING
 
-    def toggle_pause(self) -> None:
-        """Stop time, or let it go on; only while a game is under way."""
-        if self.phase is Phase.PAUSED:
-            self.phase = self._resumes_to
-        elif self.phase in (Phase.INTRO, Phase.PLAYING):
+    def skip_intro(self) -> None:
+        """Let the keys work at once, instead of when the intro is over."""
+        if self.phase is Phase.INTRO:
+            self.restart()
+
+    def pause(self) -> None:
+        """Stop time, while a game is under way."""
+        if self.is_moving:
             self._resumes_to, self.phase = self.phase, Phase.PAUSED
+
+    def resume(self) -> None:
+        """Let time go on, from the moment that is shown."""
+        if self.phase is Phase.PAUSED:
+            self._go_on()
+            self.phase = self._resumes_to
+
+    def seek(self, time_s: float) -> None:
+        """Show another moment of the episode, nearest to ``time_s`` since its start; in a pause."""
+        if self.phase is Phase.PAUSED:
+            self._history.seek(round(time_s / self.simulation.duration_s))
+            self._before = self._after = self.simulation.qpos[0]
+
+    def step_once(self, held: str = "") -> None:
+        """Make one control step in a pause, from the moment that is shown."""
+        if self.phase is Phase.PAUSED:
+            self._go_on()
+            self._step(held)
+
+    def set_speed(self, factor: float) -> None:
+        """Let the game run slower or faster than the clock, from `SLOWEST` to `FASTEST` of it."""
+        self.speed = min(max(factor, SLOWEST), FASTEST)
+        self.practice |= self.speed < 1.0
 
     def hand_back(self) -> None:
         """Give the ball back to the agent, if there is one."""
         if self._agent is not None:
             self._agent.reset()
             self.agent_plays = True
+
+    def warm_up(self) -> None:
+        """Have compiled what a step needs, in a game that nobody sees."""
+        unseen = Simulation(self.config, num_envs=1)
+        unseen.seed([np.random.default_rng(0)])
+        unseen.reset()
+        unseen.step(np.zeros((1, 2)))
 
     def close(self) -> None:
         """Leave the game; the observers are told of an episode that was not played to its end."""
@@ -283,9 +342,10 @@ class GameSession:
             self.agent_plays = False
         if self.phase is Phase.PAUSED:
             return 0
+        elapsed_s *= self.speed
         self._scenery_s += elapsed_s
         made = 0
-        if self.phase in (Phase.INTRO, Phase.PLAYING):
+        if self.is_moving:
             for _ in range(self._pacer.advance(elapsed_s)):
                 made += 1
                 if self._step(held):
@@ -299,6 +359,8 @@ class GameSession:
         self._before = simulation.qpos[0]
         transition = simulation.step(force)
         self._after = simulation.qpos[0]
+        self._force_n = force[0]
+        self._history.record(force)
         for observer in self._observers:
             observer.on_step(simulation, force, transition)
         if self.phase is Phase.INTRO and simulation.state.control_delay_s[0] <= 0.0:
@@ -327,11 +389,23 @@ class GameSession:
         self.simulation.reset(intro=intro)
         # Nothing to draw between: the ball did not move there, it was put there.
         self._before = self._after = self.simulation.qpos[0]
+        self._force_n = np.zeros(2)
+        self._history = History(self.simulation)
+        self.practice = self.speed < 1.0
         if self._agent is not None:
             self._agent.reset()
         self._under_way = True
         for observer in self._observers:
             observer.on_reset(self.simulation, self.seed)
+
+    def _go_on(self) -> None:
+        """Tell those who watch if time goes on from a moment before the last."""
+        if self._history.is_back:
+            self.practice = True
+            if self._agent is not None:
+                self._agent.reset()
+            for observer in self._observers:
+                observer.on_rewind(self.simulation)
 
     def _leave(self) -> None:
         if self._under_way:

@@ -201,8 +201,8 @@ class Replay:
 
     @cached_property
     def level_hash(self) -> str:
-        """SHA-256 of `level_text`, hexadecimal."""
-        return hashlib.sha256(self.level_text.encode()).hexdigest()
+        """See `level_hash`."""
+        return level_hash(self.level)
 
     @cached_property
     def environment_key(self) -> tuple[str, str]:
@@ -242,6 +242,11 @@ def _level_of(options: EnvConfig) -> Level:
 def canonical_text(level: Level) -> str:
     """Return a level as JSON in metres with every default written out: equal levels, equal text."""
     return level.model_dump_json()
+
+
+def level_hash(level: Level) -> str:
+    """Return the SHA-256 of `canonical_text`, hexadecimal: equal levels, equal hash."""
+    return hashlib.sha256(canonical_text(level).encode()).hexdigest()
 
 
 def check_game(options: EnvConfig, start: tuple[float, float, float], steps: int) -> None:

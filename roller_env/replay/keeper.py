@@ -29,6 +29,7 @@ class ReplayKeeper:
     Attributes:
         replays: what was played so far, episodes without a step left out.
         files: where it is.
+        directory: for the files; None if none are written.
     """
 
     def __init__(self, directory: Path | None = None, player: str = "human"):
@@ -46,7 +47,7 @@ class ReplayKeeper:
             _check_directory(directory)
         self.replays: list[Replay] = []
         self.files: list[Path] = []
-        self._directory = directory
+        self.directory = directory
         self._player = player
         self._recorder: Recorder | None = None
         self._file: Path | None = None
@@ -65,9 +66,15 @@ class ReplayKeeper:
             return
         self._recorder.record(force_n)
         now_s = float(simulation.time_s[0])
-        if self._directory is not None and now_s >= self._saved_s + SAVE_EVERY_S:
+        if self.directory is not None and now_s >= self._saved_s + SAVE_EVERY_S:
             self._saved_s = now_s
             self._keep(self._recorder)
+
+    def on_rewind(self, simulation: Simulation) -> None:
+        """Forget what came after the step to which the game went back."""
+        if self._recorder is not None:
+            self._recorder.rewind()
+            self._saved_s = min(self._saved_s, float(simulation.time_s[0]))
 
     def on_end(self, *_: object) -> None:
         """Keep the recording: the episode is over, or was left."""
@@ -90,9 +97,9 @@ class ReplayKeeper:
             return None
         if len(replay) == 0:
             return None
-        if self._directory is not None:
+        if self.directory is not None:
             try:
-                self._write(replay, self._directory)
+                self._write(replay, self.directory)
             except OSError as error:
                 print(f"replay not written: {error}", file=sys.stderr, flush=True)
         return replay

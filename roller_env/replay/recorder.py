@@ -124,6 +124,21 @@ class Recorder:
             take.is_over = bool(over[row])
         self._check(np.sort([row for row in made if steps[row] % self._every == 0]))
 
+    def rewind(self, row: int = 0) -> None:
+        """Forget of a row what came after the step to which it was put back, by a snapshot.
+
+        Raises:
+            KeyError: the row is not recorded.
+            ValueError: it is not at a step before.
+        """
+        take, now = self._takes[row], int(self._simulation.state.steps[row])
+        if now > take.steps:
+            raise ValueError(f"row {row}: found it at step {now} after {take.steps} recorded")
+        take.steps = now
+        del take.forces[2 * now :]
+        del take.checksums[now // self._every + 1 :]
+        take.is_over = bool(self._simulation.state.over[row])
+
     def _check(self, rows: Int64) -> None:
         """Add a row of checksums to the takes of these rows."""
         if len(rows):

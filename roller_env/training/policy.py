@@ -13,6 +13,7 @@ import json
 import math
 import os
 import pickle
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Protocol
@@ -20,6 +21,7 @@ from typing import Annotated, Any, Final, Literal, Protocol
 import numpy as np
 import numpy.typing as npt
 import safetensors.torch
+import torch
 from gymnasium import Space, spaces
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from safetensors import SafetensorError
@@ -29,7 +31,8 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from roller_env import __version__
 from roller_env.arrays import Float64
-from roller_env.envs.spaces import Observations
+from roller_env.config import LevelSource
+from roller_env.envs.spaces import Observations, entries_of
 from roller_env.problems import field_name, shown
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.files import RunError, RunFiles, read_whole, write_atomically
@@ -89,6 +92,33 @@ class TrainedPolicy:
         seen = observations if self.normalisation is None else self.normalisation(observations)
         actions, _ = self.network.predict(seen, deterministic=True)
         return actions
+
+    def plays(self, level: LevelSource) -> bool:
+        """Say whether a level shows what this agent has learnt to see: the same entries."""
+        trained = self.config.evaluation_environment
+        mine, its = (
+            [(entry.name, entry.size) for entry in entries_of(config)]
+            for config in (trained, replace(trained, level=level))
+        )
+        return mine == its
+
+    def judge(self, observations: Observations, /) -> tuple[Float64 | None, Float64]:
+        """Return what the agent thinks of its choice, and of where it is.
+
+        Args:
+            observations: as the environment gives them, leading axis of n environments.
+
+        Returns:
+            The actions' probabilities, (n, actions), None where they are not of a finite number;
+            and the discounted reward that it expects, (n,), in the units of its training.
+        """
+        seen = observations if self.normalisation is None else self.normalisation(observations)
+        with torch.no_grad():
+            tensors, _ = self.network.obs_to_tensor(seen)
+            chosen: Any = self.network.get_distribution(tensors).distribution
+            value = self.network.predict_values(tensors)[:, 0]
+        among = isinstance(chosen, torch.distributions.Categorical)
+        return chosen.probs.double().numpy() if among else None, value.double().numpy()
 
 
 class _Strict(BaseModel):

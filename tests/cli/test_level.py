@@ -157,7 +157,7 @@ def test_a_watched_level_is_drawn_and_its_faults_told_on_every_look(
 
 def test_a_save_is_seen_whether_it_is_written_over_or_put_in_place(here: Path) -> None:
     file = here / "good.yaml"
-    seen = saves(file, every_s=0.001)
+    seen = saves(file)
     next(seen)
     file.write_text(HIGH)
     next(seen)
@@ -171,7 +171,7 @@ def test_a_save_is_seen_whether_it_is_written_over_or_put_in_place(here: Path) -
 
 def test_a_file_that_is_not_there_yet_is_looked_at_once_and_again_when_it_is(here: Path) -> None:
     file = here / "later.yaml"
-    seen = saves(file, every_s=0.001)
+    seen = saves(file)
     next(seen)
     file.write_text(SMALL)
     next(seen)

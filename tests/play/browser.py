@@ -1,202 +1,110 @@
-"""A person's eyes and hands on the page, in a browser that draws only when somebody looks.
+"""A person's eyes and hands on the page.
 
-Left to itself a page draws as often as it can. Without a graphics processor that is software's
-work, of all processors for all pages: beside other work one page came to four pictures a second and
-two pages to two each, some of them 1.7 s apart, while the server sent what is new 60 times a
-second. A key that is pressed and let go between two pictures is not seen, what is sent piles up,
-and no number of seconds is enough to wait for a picture. So here a page's own clock is taken away:
-it draws one picture when a test looks, of two pages one stands still, and a wait is in vain after
-so many pictures and messages, not after so many seconds.
+Without a graphics processor software draws the page, beside whatever else the machine does: a
+picture may take a second. So nothing here waits for pictures or counts seconds: what is waited for
+is what the page is sent and what stands on it.
 """
 
 from __future__ import annotations
 
-import base64
-import io
+import json
+import struct
 import time
 from collections.abc import Callable
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
-import numpy as np
-import numpy.typing as npt
-from PIL import Image
+from tests.patience import STALLED_S
 
-Picture = npt.NDArray[np.int64]
-
-PICTURES: Final = 60
-MESSAGES: Final = 3000
-"""Drawn by the page, and heard by it of the server, which sends 20 to 120 a second: what has not
-come after both does not come."""
-
-ANSWERED: Final = 6
-"""Messages after which the server has heard what the page told it."""
-
-SILENCE_S: Final = 300.0
-"""After which a server that says nothing at all is taken for dead."""
-
-SIZE: Final = {"width": 420, "height": 320}
-SCALE: Final = 0.5
-"""Pixels that are drawn for each of the page's, along each side: a quarter of the work."""
-STATUS_ROWS: Final = 34
-"""At the bottom, of Studio's own status bar."""
-SCENE: Final = (slice(0, -STATUS_ROWS), slice(None))
-"""Rows and columns of the picture."""
-POINTS: Final = (slice(10, 95), slice(10, 125))
-"""Of the points panel."""
-PANEL: Final = (slice(120, 180), slice(25, 42))
-"""Of the left margin of the start, pause and end panels, where nothing is written."""
-WATCHED_BALL: Final = (slice(120, 165), slice(190, 230))
-"""Of the ball at the start, as a second browser sees it."""
-MIDDLE: Final = (slice(110, 260), slice(60, 360))
-"""Of the ball, and of the floor round it."""
-TIME_LINE: Final = (slice(230, 266), slice(110, 385))
-"""Of a replay's time line."""
-
-DRAWS_WHEN_TOLD: Final = """(() => {
-    const due = []
-    let heard = 0
-    window.requestAnimationFrame = callback => due.push(callback)
-    window.WebSocket = class extends WebSocket {
-        constructor(...address) {
-            super(...address)
-            this.addEventListener("message", () => { heard += 1 })
-        }
-    }
-    window.heard = () => heard
-    // What is drawn stays on the canvas until this task is over.
-    window.look = () => {
-        for (const callback of due.splice(0)) callback(performance.now())
-        return [document.querySelector("canvas").toDataURL(), heard]
-    }
-})()"""
-"""Before anything of the page runs: its frames wait until it is looked at, and it counts what the
-server sends."""
+PHASES: Final = ("start", "intro", "playing", "paused", "ended")
+_SETTINGS: Final = json.dumps({"keys": "world", "camera": "game", "quality": "low"})
+SIZE: Final = {"width": 640, "height": 400}
 
 
-class HasUrl(Protocol):
-    """Something with a page."""
-
-    url: str
-
-
-class Browser:
-    """One page of the browser, with the game or the replay on it.
+class Person:
+    """Somebody at a browser's page.
 
     Attributes:
-        page: Playwright's.
-        keyboard: its keys.
-        picture: what was seen last, (height, width, 3), as large as the page.
-        heard: messages of the server before it was drawn.
+        page: Playwright's page.
+        sent: what the page has sent, as it is.
     """
 
-    picture: Picture
-    heard: int
-
-    def __init__(self, chromium: Any, stand: HasUrl, *, controls: bool = True) -> None:
-        self._context = chromium.new_context(viewport=SIZE, device_scale_factor=SCALE)
+    def __init__(self, chromium: Any, url: str, **context: Any) -> None:
+        """Open a page in a browser of its own."""
+        self._context = chromium.new_context(**{"viewport": SIZE, **context})
         self.page = self._context.new_page()
-        self.page.set_default_timeout(1000.0 * SILENCE_S)
-        self.page.add_init_script(DRAWS_WHEN_TOLD)
-        self.keyboard = self.page.keyboard
-        log: list[str] = []
-        self.page.on("console", lambda message: log.append(message.text))
-        self.page.goto(stand.url)
-        # Studio's page tells its console what it has.
-        telling = "First remote draw frame" if controls else "scene initialized"
-        self.wait("the page is there", lambda: any(telling in line for line in log))
-        self.wait("it draws the level", lambda: colours(self.picture[SCENE]) > 500)
-
-    def look(self) -> Picture:
-        """Let the page draw, and return what is seen."""
-        url, self.heard = self.page.evaluate("look()")
-        with Image.open(io.BytesIO(base64.b64decode(url.split(",")[1]))) as image:
-            page = image.convert("RGB").resize(
-                (SIZE["width"], SIZE["height"]), Image.Resampling.NEAREST
-            )
-            self.picture = np.asarray(page).astype(np.int64)
-        return self.picture
-
-    def wait(self, what: str, holds: Callable[[], bool]) -> None:
-        """Look until something holds."""
-        self.look()
-        begin, drawn, silent_since_s = self.heard, 1, time.monotonic()
-        while not holds():
-            before = self.heard
-            self.look()
-            drawn += 1
-            if self.heard > before:
-                silent_since_s = time.monotonic()
-            silent_s, heard = time.monotonic() - silent_since_s, self.heard - begin
-            assert silent_s < SILENCE_S, (
-                f"the server said nothing for {silent_s:.0f} s until {what}"
-            )
-            assert drawn < PICTURES or heard < MESSAGES, (
-                f"{drawn} pictures and {heard} messages in vain until {what}"
-            )
-
-    def settled(self) -> Picture:
-        """Return what is seen when it no longer changes, but for a coin that turns."""
-        before = self.look()
-
-        def still() -> bool:
-            nonlocal before
-            before, now = self.picture, before
-            return differing(before[SCENE], now[SCENE]) < 0.02
-
-        self.wait("the picture is still", still)
-        return self.picture
-
-    def wait_for_change(self, what: str, before: Picture, part: Any, share: float = 0.02) -> None:
-        """Wait until more than a share of a part's pixels are not as they were ``before``."""
-        self.wait(what, lambda: differing(self.picture[part], before) > share)
-
-    def tell(self) -> None:
-        """Wait until the server has heard what keys and mouse did."""
-        self.look()
-        enough = self.heard + ANSWERED
-        self.wait("the server answers", lambda: self.heard >= enough)
-
-    def press(self, key: str, what: str, holds: Callable[[], bool]) -> None:
-        """Press a key until it has its effect, and let it go."""
-        self.keyboard.down(key)
-        self.wait(what, holds)
-        self.keyboard.up(key)
-        self.tell()
-
-    def tap(self, key: str) -> None:
-        """Press a key until the server has heard of it, and let it go."""
-        self.keyboard.down(key)
-        self.tell()
-        self.keyboard.up(key)
-        self.tell()
+        self.page.set_default_timeout(1000 * STALLED_S)
+        self.faults: list[str] = []
+        self.asked: list[str] = []
+        self.sent: list[dict[str, Any]] = []
+        self._frame = b""
+        self.page.on("pageerror", lambda error: self.faults.append(str(error)))
+        self.page.on("request", lambda request: self.asked.append(request.url))
+        self.page.on("websocket", self._on_socket)
+        # The keys of the agents: W is +x, however the camera turns.
+        self.page.add_init_script(f"localStorage.setItem('roller settings', '{_SETTINGS}')")
+        self.page.goto(url)
 
     def close(self) -> None:
-        """Leave the page."""
+        """Close it; nothing in it may have failed."""
         self._context.close()
+        assert self.faults == []
 
+    def _on_socket(self, socket: Any) -> None:
+        def received(payload: str | bytes) -> None:
+            if isinstance(payload, bytes):
+                self._frame = payload
 
-def differing(first: Picture, second: Picture) -> float:
-    """Return the share of pixels that are clearly not the same."""
-    return float((np.abs(first - second).max(axis=-1) > 24).mean())
+        socket.on("framereceived", received)
+        socket.on("framesent", lambda payload: self.sent.append(json.loads(payload)))
 
+    @property
+    def phase(self) -> str:
+        """What the game does, as the page was told last."""
+        return PHASES[self._frame[1]] if self._frame else ""
 
-def colours(part: Picture) -> int:
-    """Return how many different colours there are."""
-    return len(np.unique(part.reshape(-1, 3), axis=0))
+    @property
+    def x(self) -> float:
+        """How far forward the ball is, metres."""
+        return float(struct.unpack_from("<f", self._frame, 32)[0])
 
+    @property
+    def keys(self) -> int:
+        """The keys that push."""
+        return self._frame[30]
 
-def dark(part: Picture) -> float:
-    """Return the share of pixels as dark as a panel."""
-    return float((part.max(axis=-1) < 110).mean())
+    @property
+    def ghost(self) -> bool:
+        """Whether a ghost is there."""
+        return bool(self._frame[2] & 8)
 
+    def wait(self, what: str, condition: Callable[[], bool]) -> None:
+        """Wait until something is so."""
+        begin = time.monotonic()
+        while not condition():
+            assert time.monotonic() < begin + STALLED_S, what
+            self.page.wait_for_timeout(20)
 
-def gold_pixels(part: Picture) -> npt.NDArray[np.bool_]:
-    """Say which pixels are of the gold of the points and of the time line's grab."""
-    red, green, blue = (part[..., channel] for channel in range(3))
-    of_gold: npt.NDArray[np.bool_] = (red > 180) & (green > 130) & (blue < 120)
-    return of_gold
+    def wait_for_phase(self, phase: str) -> None:
+        """Wait until the game does something."""
+        self.wait(f"the game is {phase}", lambda: self.phase == phase)
 
+    def press(self, key: str) -> None:
+        """Press a key and let it go."""
+        self.page.keyboard.press(key)
 
-def gold(part: Picture) -> int:
-    """Return how many pixels are of that gold."""
-    return int(gold_pixels(part).sum())
+    def start(self) -> None:
+        """Start the game from the start page."""
+        self.wait_for_phase("start")
+        self.page.get_by_role("button", name="Start", exact=True).wait_for()
+        self.press("Enter")
+        self.wait_for_phase("playing")
+
+    def hold_until(self, key: str, what: str, condition: Callable[[], bool]) -> None:
+        """Hold a key until something is so."""
+        self.page.keyboard.down(key)
+        self.wait(what, condition)
+        self.page.keyboard.up(key)
+
+    def sees(self, text: str) -> None:
+        """Wait until a text stands on the page."""
+        self.page.get_by_text(text).filter(visible=True).first.wait_for()

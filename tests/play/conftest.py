@@ -10,8 +10,6 @@ from typing import Any, Final
 
 import pytest
 
-from tests.play.stand import ReplayStand, Stand
-
 NAMES: Final = ("chromium", "chromium-browser", "google-chrome")
 
 FLAGS: Final = (
@@ -53,19 +51,3 @@ def chromium() -> Iterator[Any]:
         browser = playwright.chromium.launch(executable_path=executable, args=list(FLAGS))
         yield browser
         browser.close()
-
-
-@pytest.fixture(scope="session")
-def stand() -> Iterator[Stand]:
-    """A game on the lane, on a page."""
-    stand = Stand()
-    yield stand
-    assert stand.close() == 0
-
-
-@pytest.fixture(scope="module")
-def replay_stand() -> Iterator[ReplayStand]:
-    """A replay, on a page."""
-    stand = ReplayStand()
-    yield stand
-    assert stand.close() == 0

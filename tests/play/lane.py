@@ -79,5 +79,8 @@ class Witness:
         self.forces[-1].append(force_n.copy())
         assert simulation.state.steps[0] == len(self.forces[-1])
 
+    def on_rewind(self, simulation: Simulation) -> None:
+        raise AssertionError("nobody went back")
+
     def on_end(self, simulation: Simulation, result: EpisodeResult) -> None:
         self.results.append(result)

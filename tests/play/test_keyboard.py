@@ -138,7 +138,7 @@ def test_keys_that_do_not_steer_are_no_directions() -> None:
 
 @pytest.mark.usefixtures("opengl")
 def test_gymnasiums_own_play_drives_the_ball(monkeypatch: pytest.MonkeyPatch) -> None:
-    pygame = pytest.importorskip("pygame", reason="pygame (the extra 'sound') is not installed")
+    pygame = pytest.importorskip("pygame", reason="pygame is not installed")
     monkeypatch.setitem(os.environ, "SDL_VIDEODRIVER", "dummy")
     from gymnasium.utils.play import play
 

@@ -1,55 +1,255 @@
-"""Who can reach the page."""
+"""Who can reach the page, and what it is sent."""
 
 from __future__ import annotations
 
+import contextlib
+import gzip
+import json
 import os
 import signal
 import socket
+import subprocess
 import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import pytest
-from websockets.exceptions import InvalidStatus
-from websockets.sync.client import connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin
 
-from roller_env.play import server
-from roller_env.play.server import PlayError, open_page, open_window, run, warning_of
+from roller_env.play.server import LOOPBACK, MAX_GUESTS, PlayError, listen, warning_of
 from tests.patience import STALLED_S
-from tests.play.stand import Stand
+from tests.play.served import ROOT, Served
 
-pytestmark = pytest.mark.xdist_group("browser")
-
-LISTEN = "0A"
-"""State of a listening socket in /proc/net/tcp."""
+pytestmark = pytest.mark.xdist_group("page")
 
 
-def listening_addresses(port: int) -> set[str]:
-    """Return the addresses on which this machine listens on a port, in the kernel's own words."""
-    found = set()
-    for table in ("tcp", "tcp6"):
-        for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
-            local, state = line.split()[1], line.split()[3]
-            address, _, local_port = local.rpartition(":")
-            if state == LISTEN and int(local_port, 16) == port:
-                found.add(address)
-    return found
+def play(records: Path, *arguments: str) -> Served:
+    """Start a game."""
+    return Served("play", "flat", "--physics=rigid", f"--records={records}", *arguments)
 
 
-@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="no /proc/net/tcp on this system")
-def test_the_page_is_served_on_the_loopback_address_alone(stand: Stand) -> None:
-    # 127.0.0.1 as a little-endian number in hexadecimal.
-    assert listening_addresses(stand.port) == {"0100007F"}
+def connected(game: Served, **options: Any) -> ClientConnection:
+    """Connect as a browser does."""
+    # A connection that nobody reads takes its time to say good bye.
+    options = {"close_timeout": 0.1, **options}
+    connection: ClientConnection = connect(f"ws://localhost:{game.port}/ws", **options)
+    return connection
 
 
-@pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="no /proc/net/tcp on this system")
-def test_a_host_that_was_asked_for_is_listened_on_until_the_game_is_closed() -> None:
-    stand = Stand("127.0.0.2")
-    assert listening_addresses(stand.port) == {"0200007F"}
-    assert stand.close() == 0
-    assert not listening_addresses(stand.port)
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    game = play(tmp_path_factory.mktemp("records") / "records.sqlite3")
+    yield game
+    assert game.end()[0] == 0
+
+
+def messages(connection: ClientConnection, kind: str) -> Any:
+    """Return the next message of a kind."""
+    while True:
+        found = connection.recv(timeout=STALLED_S)
+        if isinstance(found, str) and json.loads(found)["type"] == kind:
+            return json.loads(found)
+
+
+def frame(connection: ClientConnection) -> bytes:
+    """Return the next frame."""
+    while True:
+        found = connection.recv(timeout=STALLED_S)
+        if isinstance(found, bytes):
+            return found
+
+
+def code_of_end(connection: ClientConnection) -> int | None:
+    """Return why the server ends a connection."""
+    with contextlib.suppress(ConnectionClosed):
+        while True:
+            connection.recv(timeout=STALLED_S)
+    return connection.close_code
+
+
+def get(url: str, **headers: str) -> tuple[int, bytes, Any]:
+    request = urllib.request.Request(url, headers={"Accept-Encoding": "gzip", **headers})
+    try:
+        with urllib.request.urlopen(request, timeout=STALLED_S) as answer:
+            return answer.status, answer.read(), answer.headers
+    except urllib.error.HTTPError as error:
+        return error.code, b"", error.headers
+
+
+def test_a_page_gets_its_level_and_frames(served: Served) -> None:
+    with connected(served) as connection:
+        hello = messages(connection, "hello")
+        assert (hello["seat"], hello["mode"]) == ("player", "play")
+        assert [row["number"] for row in hello["levels"]] == list(range(1, 21))
+        level = messages(connection, "level")
+        status, content, headers = get(served.url(level["scene"]))
+        assert status == 200
+        assert headers["Content-Encoding"] == "gzip"
+        assert json.loads(gzip.decompress(content))["name"] == "flat"
+        assert len(frame(connection)) == 96 + 2
+
+
+def test_the_page_asks_no_other_host_for_anything(served: Served) -> None:
+    status, content, headers = get(served.url())
+    assert status == 200
+    assert "default-src 'self'" in headers["Content-Security-Policy"]
+    if headers.get("Content-Encoding") == "gzip":
+        content = gzip.decompress(content)
+    assert b"://" not in content.replace(b"http://www.w3.org", b"")
+
+
+@pytest.mark.parametrize("path", ["/sounds/coin.wav", "/pictures/classic.jpg"])
+def test_sounds_and_pictures_are_served(served: Served, path: str) -> None:
+    assert get(served.url(path))[0] == 200
+
+
+@pytest.mark.parametrize("path", ["/../pyproject.toml", "/%2e%2e/pyproject.toml", "/scene/x.json"])
+def test_nothing_else_is_served(served: Served, path: str) -> None:
+    assert get(served.url(path))[0] == 404
+
+
+def test_the_page_is_reached_by_no_other_name(served: Served) -> None:
+    assert get(served.url(), Host="evil.example")[0] == 400
+
+
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "null", "http://localhost.evil.example", "https://localhost"]
+)
+def test_a_page_of_another_origin_is_not_let_in(served: Served, origin: str) -> None:
+    with pytest.raises(InvalidStatus, match="403"):
+        connected(served, origin=Origin(origin))
+
+
+def test_a_page_of_a_tunnels_other_end_is_let_in(served: Served) -> None:
+    with connected(served, origin=Origin("http://localhost:9999")) as connection:
+        assert messages(connection, "hello")["type"] == "hello"
+
+
+@pytest.mark.parametrize("text", ["", "{}", '{"type":"quit"}', "x" * 400, '{"type":"keys"}'])
+def test_who_sends_what_is_no_message_is_sent_away_and_the_game_goes_on(
+    served: Served, text: str
+) -> None:
+    with connected(served) as connection:
+        messages(connection, "hello")
+        connection.send(text)
+        assert code_of_end(connection) == 1008
+    with connected(served) as connection:
+        assert frame(connection)
+
+
+def test_a_message_without_end_is_not_read(served: Served) -> None:
+    with connected(served) as connection:
+        connection.send("x" * 100_000)
+        assert code_of_end(connection) == 1009
+
+
+def test_no_more_browsers_than_there_is_room_for(served: Served) -> None:
+    with contextlib.ExitStack() as there:
+        for _ in range(MAX_GUESTS):
+            messages(there.enter_context(connected(served)), "hello")
+        with connected(served) as connection:
+            assert code_of_end(connection) == 1013
+
+
+def test_a_browser_that_takes_nothing_holds_up_nobody(served: Served) -> None:
+    with connected(served) as player, connected(served, max_queue=1) as slow:
+        messages(player, "hello")
+        player.send('{"type":"start"}')
+        player.send('{"type":"skip"}')
+        # It stops reading; the player's frames come as before.
+        begin, frames = time.monotonic(), 0
+        while frames < 60:
+            frame(player)
+            frames += 1
+        assert time.monotonic() - begin < STALLED_S
+        assert slow.close_code is None
+
+
+def test_an_idle_page_costs_next_to_nothing(served: Served) -> None:
+    psutil = pytest.importorskip("psutil")
+    process = psutil.Process(served.process.pid)
+    with connected(served) as connection:
+        for _ in range(5):
+            frame(connection)
+        before, begin = sum(process.cpu_times()[:2]), time.monotonic()
+        while time.monotonic() < begin + 3.0:
+            frame(connection)
+        share = (sum(process.cpu_times()[:2]) - before) / (time.monotonic() - begin)
+    assert share < 0.03
+
+
+def test_records_outlive_the_program_even_a_killed_one(tmp_path: Path) -> None:
+    records = tmp_path / "records.sqlite3"
+    game = play(records, "--skip-intro")
+    with connected(game) as connection:
+        messages(connection, "level")
+        connection.send('{"type":"start"}')
+        told: dict[str, Any] = {}
+        while told.get("type") != "result":
+            found = connection.recv(timeout=STALLED_S)
+            connection.send('{"type":"keys","held":"w"}')
+            told = json.loads(found) if isinstance(found, str) else {}
+        assert told["best_time"]
+    game.end(signal.SIGKILL)
+    game = play(records)
+    with connected(game) as connection:
+        row = messages(connection, "levels")["levels"][0]
+        assert row["name"] == "flat"
+        assert row["best_time_s"] > 1.0
+    assert game.end(signal.SIGTERM)[0] == 0
+
+
+@pytest.fixture
+def taken() -> Iterator[int]:
+    """Return a port on which somebody listens."""
+    with socket.create_server((LOOPBACK, 0)) as server:
+        yield server.getsockname()[1]
+
+
+@pytest.mark.parametrize("port", [-1, 65536, 99999, 2**40])
+def test_a_port_that_there_is_none_of_is_refused(port: int) -> None:
+    with pytest.raises(PlayError, match=f"port: found {port}; must be a whole number from 0 to"):
+        listen(LOOPBACK, port)
+
+
+def test_a_port_that_is_taken_is_refused(taken: int) -> None:
+    with pytest.raises(PlayError, match=f"port {taken} of 127.0.0.1: Address already in use"):
+        listen(LOOPBACK, taken)
+
+
+def test_a_host_that_is_none_of_this_machines_is_refused() -> None:
+    for host in ("nowhere.invalid", "8.8.8.8"):
+        with pytest.raises(PlayError, match=f"host '{host}': .*; --host says where to listen"):
+            listen(host, 0)
+
+
+@pytest.mark.parametrize("host", [LOOPBACK, "localhost", "0.0.0.0"])
+def test_any_free_port_will_do(host: str) -> None:
+    listen(host, 0).close()
+
+
+@pytest.mark.parametrize("command", [("play.py",), ("replay.py", "flat", "--show")])
+def test_a_taken_port_is_told_before_anything_is_loaded(taken: int, command: list[str]) -> None:
+    script, *arguments = command
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "scripts" / script), *arguments, f"--port={taken}"],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=STALLED_S,
+    )
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"error: port {taken} of 127.0.0.1: Address already in use")
+    assert done.stderr.count("\n") == 1
+    # What a replay or a level is, is told when it is loaded.
+    assert done.stdout == ""
 
 
 def test_listening_elsewhere_is_said_to_be_open_to_everybody() -> None:
@@ -57,76 +257,3 @@ def test_listening_elsewhere_is_said_to_be_open_to_everybody() -> None:
     assert warning is not None
     assert "no password" in warning
     assert warning_of("127.0.0.1") is None
-
-
-@pytest.mark.parametrize("path", ["ui", "state", "drop"])
-@pytest.mark.parametrize("origin", ["http://evil.example", "https://localhost.evil.example"])
-def test_a_page_from_elsewhere_is_refused(stand: Stand, path: str, origin: str) -> None:
-    with pytest.raises(InvalidStatus) as refusal:
-        connect(f"ws://127.0.0.1:{stand.port}/{path}", origin=Origin(origin))
-    assert refusal.value.response.status_code == 403
-
-
-@pytest.mark.parametrize("name", ["localhost", "127.0.0.1"])
-def test_the_games_own_page_is_let_in_also_through_a_tunnel(stand: Stand, name: str) -> None:
-    origin = f"http://{name}:9999"
-    with connect(f"ws://127.0.0.1:{stand.port}/state", origin=Origin(origin)) as state:
-        assert "role=" in str(state.recv(timeout=STALLED_S))
-
-
-def test_a_port_that_is_taken_is_said_to_be() -> None:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        with pytest.raises(RuntimeError, match=f"Port {port} is already in use"):
-            run(open_page([], port=port))
-
-
-@pytest.mark.skipif(sys.version_info >= server.NATIVE_PYTHON, reason="this Python opens windows")
-def test_a_window_on_an_old_python_is_refused_with_what_helps() -> None:
-    with pytest.raises(PlayError, match=r"needs Python 3\.12 or newer.*--viewer web"):
-        open_window([])
-
-
-class InterruptedGame:
-    """What `run` runs, whose step is under way when a signal comes."""
-
-    def __init__(self, number: signal.Signals) -> None:
-        self.number = number
-        self.begun = self.ended = 0
-
-    def __enter__(self) -> InterruptedGame:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        assert error is None
-
-    def dispatch(self, message: object) -> None:
-        pass
-
-    def is_running(self) -> bool:
-        return True
-
-    def sync(self) -> None:
-        self.begun += 1
-        if self.begun == 3:
-            os.kill(os.getpid(), self.number)
-        self.ended += 1
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_game_that_is_told_to_end_makes_its_step_first(
-    number: signal.Signals, capsys: pytest.CaptureFixture[str]
-) -> None:
-    before = signal.getsignal(number)
-    game: Any = InterruptedGame(number)
-    run(game)
-    assert (game.begun, game.ended) == (3, 3)
-    assert "Good bye." in capsys.readouterr().out
-    assert signal.getsignal(number) is before

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -164,20 +165,11 @@ def test_the_ball_is_drawn_turning_by_slerp() -> None:
     frame = session.frame()
     turn = slice(3, 7)
     before, after = frame.before[turn], frame.after[turn]
-    half = frame.qpos(frame.made_s + (0.5 - frame.fraction) * frame.step_s)[turn]
+    half = replace(frame, fraction=0.5).qpos()[turn]
     assert np.linalg.norm(half) == pytest.approx(1.0)
     # Half way by slerp: as far from the one as from the other.
     assert abs(half @ before) == pytest.approx(abs(half @ after), abs=1e-12)
     assert abs(half @ before) > abs(before @ after)
-
-
-def test_a_frame_drawn_later_lies_further_on_but_never_beyond_what_is_known() -> None:
-    session = game()
-    play(session, 0.5, "w")
-    frame = session.frame()
-    x = 0
-    assert frame.qpos(frame.made_s)[x] < frame.qpos(frame.made_s + 0.2 * frame.step_s)[x]
-    assert frame.qpos(frame.made_s + 10.0)[x] == frame.after[x]
 
 
 def test_a_frame_does_not_change_while_the_game_goes_on() -> None:
@@ -193,13 +185,13 @@ def test_a_frame_does_not_change_while_the_game_goes_on() -> None:
 def test_a_pause_stops_time_and_the_scenery() -> None:
     session = game()
     play(session, 0.3, "w")
-    session.toggle_pause()
+    session.pause()
     assert session.phase is Phase.PAUSED
     before, clock = session.simulation.qpos, session.frame().clock_s
     play(session, 2.0, "w")
     assert (session.simulation.qpos == before).all()
     assert session.frame().clock_s == clock
-    session.toggle_pause()
+    session.resume()
     play(session, 0.2, "w")
     assert (session.simulation.qpos != before).any()
 
@@ -207,9 +199,9 @@ def test_a_pause_stops_time_and_the_scenery() -> None:
 def test_a_pause_in_the_intro_goes_on_with_the_intro() -> None:
     session = game(skip_intro=False)
     play(session, 2.0)
-    session.toggle_pause()
+    session.pause()
     play(session, 60.0)
-    session.toggle_pause()
+    session.resume()
     assert session.phase is Phase.INTRO
     assert play_until(session, Phase.PLAYING) == pytest.approx(INTRO_S - 2.0, abs=2 * FRAME_S)
 
@@ -316,6 +308,10 @@ class Recording:
         assert self._recorder is not None
         self._recorder.record(force_n)
 
+    def on_rewind(self, simulation: Simulation) -> None:
+        assert self._recorder is not None
+        self._recorder.rewind()
+
     def on_end(self, simulation: Simulation, result: Any) -> None:
         assert self._recorder is not None
         self.replays.append(self._recorder.replay())
@@ -329,6 +325,79 @@ def test_a_played_game_is_a_replay_that_verifies(skip_intro: bool) -> None:
     verification = verify(recording.replays[0])
     assert verification.is_exact, str(verification)
     assert recording.replays[0].result.success
+
+
+@settings(max_examples=15)
+@given(
+    back_to=st.lists(st.floats(0.0, 1.5), min_size=1, max_size=4),
+    held=st.lists(st.sampled_from(["w", "wa", "d", ""]), min_size=5, max_size=5),
+)
+def test_a_game_that_went_back_is_the_game_of_the_keys_that_count(
+    back_to: list[float], held: list[str]
+) -> None:
+    recording = Recording()
+    session = game(observers=[recording])
+    play(session, 0.7, held[0])
+    for moment, keys in zip(back_to, held[1:], strict=False):
+        session.pause()
+        session.seek(moment)
+        session.resume()
+        play(session, 0.4, keys)
+    session.close()
+    verification = verify(recording.replays[0])
+    assert verification.is_exact, str(verification)
+
+
+def test_whoever_goes_back_and_does_the_same_again_gets_the_same_bits() -> None:
+    session = game()
+    play(session, 1.0, "w")
+    there = session.simulation.qpos
+    session.pause()
+    session.seek(0.35)
+    assert session.frame().result.time_s == pytest.approx(0.35, abs=1 / 240)
+    assert (session.simulation.qpos != there).any()
+    session.seek(9.0)
+    assert (session.simulation.qpos == there).all()
+    assert not session.practice
+    session.seek(0.35)
+    while session.simulation.state.steps[0] < 240:
+        session.step_once("w")
+    assert (session.simulation.qpos == there).all()
+    assert session.practice
+
+
+def test_only_in_a_pause_one_goes_back() -> None:
+    session = game()
+    play(session, 0.5, "w")
+    there = session.simulation.qpos
+    session.seek(0.1)
+    session.step_once("w")
+    assert (session.simulation.qpos == there).all()
+
+
+def test_a_long_game_forgets_moments_but_none_that_it_cannot_play_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("roller_env.play.history.KEYFRAMES", 5)
+    session = game(lane(coins=[]))
+    places: list[Float64] = []
+    for _ in range(150):
+        session.advance(FRAME_S, "wd" if len(places) % 40 < 20 else "as")
+        places.append(session.simulation.qpos)
+    session.pause()
+    for number in (149, 3, 80, 81, 20, 149):
+        session.seek((number + 1) * FRAME_S)
+        assert (session.simulation.qpos == places[number]).all()
+
+
+def test_in_slow_motion_a_second_is_a_part_of_a_second() -> None:
+    session = game()
+    session.set_speed(0.25)
+    play(session, 1.0, "w")
+    assert session.result.time_s == pytest.approx(0.25, abs=1.5 * FRAME_S)
+    assert session.practice
+    session.set_speed(100.0)
+    assert session.speed == 4.0
 
 
 class Eastward:

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from roller_env.cli import play
+from roller_env.play.room import Room
 from roller_env.replay import load_replay, verify
 from roller_env.replay.keeper import ReplayKeeper
+from tests.play.test_room import Somebody, push, started
 from tests.replay.recording import pushed_otherwise, wandered
 
 minari = pytest.importorskip("minari", reason="the extra 'demos' is not installed")
@@ -72,27 +74,27 @@ def test_what_fails_while_it_is_played_costs_nothing_of_what_was_played(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    made = []
 
-    def session_maker(*arguments: Any) -> Any:
-        made.append(_session_maker(*arguments))
-        return made[0]
+    def serve(room: Room, *_: object) -> None:
+        async def lost() -> None:
+            running = asyncio.create_task(room.run())
+            player = Somebody(room)
+            await started(player)
+            await push(player, lambda: player.x > 0.1)
+            running.cancel()
+            await asyncio.gather(running, return_exceptions=True)
+            room.close()
+            raise RuntimeError("the page is gone")
 
-    def run(_: object) -> None:
-        session = made[0]("flat")
-        session.start()
-        session.advance(0.1, "w")
-        session.close()
-        raise RuntimeError("the page is gone")
+        asyncio.run(lost())
 
-    _session_maker = play.session_maker
-    monkeypatch.setattr(play, "session_maker", session_maker)
-    monkeypatch.setattr(play, "GamePlugin", lambda *_: None)
-    monkeypatch.setattr(play, "open_page", lambda *_, **__: None)
-    monkeypatch.setattr(play, "run", run)
+    monkeypatch.setattr(play, "serve", serve)
+    records = tmp_path / "records.sqlite3"
     with pytest.raises(RuntimeError, match="the page is gone"):
         play.play(
-            play.Arguments(level="flat", skip_intro=True, mute=True, record="roller/human", port=0)
+            play.Arguments(
+                level="flat", skip_intro=True, record="roller/human", port=0, records=records
+            )
         )
     assert minari.load_dataset("roller/human/flat-v0").total_episodes == 1
     # Without --replays, games that become data sets are kept in a directory of their own.

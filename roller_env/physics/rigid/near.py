@@ -71,8 +71,9 @@ def gather(
         left: seconds.
     """
     work.found = 0
-    x = math.floor((position[0] - level.origin[0]) / level.cell)
-    y = math.floor((position[1] - level.origin[1]) / level.cell)
+    # A floor is an integer but for CUDA.
+    x = int(math.floor((position[0] - level.origin[0]) / level.cell))  # noqa: RUF046
+    y = int(math.floor((position[1] - level.origin[1]) / level.cell))  # noqa: RUF046
     if not (0 <= x < level.grid[0] and 0 <= y < level.grid[1]):
         return
     cell = level.first_cell + x * level.grid[1] + y

@@ -71,25 +71,31 @@ SLAB: Final = np.dtype(
 
 _SIZE: Final = 3 * MOST_CONTACTS
 
-WORK: Final = np.dtype(
-    [
-        ("contact", CONTACT, MOST_CONTACTS + 1),  # the last is spare
-        ("response", np.float64, (_SIZE, _SIZE)),  # rates of change by unit impulses
-        ("system", np.float64, (_SIZE, _SIZE + 1)),
-        ("columns", np.int64, _SIZE),
-        ("frame", np.float64, (_SIZE, 3)),  # normal and two tangents of every active contact
-        ("active", np.int64, MOST_CONTACTS),
-        ("near", NEAR, MOST_NEAR),
-        ("found", np.int64),  # how many of `near` there are
-        # What the step of a ball took, as `states.Counts` says.
-        ("segments", np.int64),
-        ("forced", np.int64),
-        ("unsolved", np.int64),
-        ("blocked", np.int64),
-    ],
-    align=True,
-)
-"""What one thread needs for one ball at a time."""
+
+def work_record(most_near: int = MOST_NEAR) -> np.dtype[np.void]:
+    """Return what one thread needs for one ball at a time, near ``most_near`` solids."""
+    return np.dtype(
+        [
+            ("contact", CONTACT, MOST_CONTACTS + 1),  # the last is spare
+            ("response", np.float64, (_SIZE, _SIZE)),  # rates of change by unit impulses
+            ("system", np.float64, (_SIZE, _SIZE + 1)),
+            ("columns", np.int64, _SIZE),
+            ("frame", np.float64, (_SIZE, 3)),  # normal and two tangents of every active contact
+            ("active", np.int64, MOST_CONTACTS),
+            ("near", NEAR, most_near),
+            ("found", np.int64),  # how many of `near` there are
+            # What the step of a ball took, as `states.Counts` says.
+            ("segments", np.int64),
+            ("forced", np.int64),
+            ("unsolved", np.int64),
+            ("blocked", np.int64),
+        ],
+        align=True,
+    )
+
+
+WORK: Final = work_record()
+"""Enough for any scenes: Numba compiles anew for a record of another size."""
 
 
 class Workspace(NamedTuple):
