@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from roller_env import names
@@ -35,6 +35,8 @@ class Problem:
         column: column in the file, from 1; None where there is none.
         written: the name that was written, when names are what is at fault.
         known: the names that could have been meant.
+        note: of several things that are written in that place, which; problems that differ in
+            nothing else are equal.
     """
 
     path: FieldPath
@@ -44,6 +46,7 @@ class Problem:
     column: int | None = None
     written: str = ""
     known: tuple[str, ...] = ()
+    note: str = field(default="", compare=False)
 
     @property
     def field(self) -> str:
@@ -66,7 +69,9 @@ class Problem:
     def what(self) -> str:
         """Everything but the place."""
         said = ": ".join(part for part in (self.field, self.message) if part)
-        return said if self.nearest is None else f"{said} (did you mean '{self.nearest}'?)"
+        if self.nearest is not None:
+            said += f" (did you mean '{self.nearest}'?)"
+        return f"{said} ({self.note})" if self.note else said
 
     def __str__(self) -> str:
         return ": ".join(part for part in (self.where, self.what) if part)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -68,21 +69,34 @@ class SavedFile:
     was saved.
     """
 
-    def __init__(self, path: Path):
-        self._path = path
-        self._before: tuple[int, ...] | None = ()
+    def __init__(
+        self, path: Path, files_of: Callable[[Path], Sequence[Path]] = lambda path: [path]
+    ):
+        """Look at a file, and at those that belong to it.
+
+        Args:
+            path: the file.
+            files_of: returns it and the others; asked anew whenever one of them has been saved. By
+                default there are none.
+        """
+        self._path, self._files_of = path, files_of
+        self._files: Sequence[Path] = [path]
+        self._before: list[tuple[int, ...] | None] = []
 
     def is_new(self) -> bool:
-        """Say whether the file has been saved; so it is at the first time, there or not."""
-        now = self._signature()
-        if now == self._before or (now is None and self._before != ()):
+        """Say whether one has been saved; so it is at the first time, there or not."""
+        now = list(map(_signature, self._files))
+        if now == self._before or (now[0] is None and self._before):
             return False
-        self._before = now
+        if self._files_of is not None:
+            self._files = self._files_of(self._path)
+        self._before = list(map(_signature, self._files))
         return True
 
-    def _signature(self) -> tuple[int, ...] | None:
-        try:
-            found = self._path.stat()
-        except OSError:
-            return None
-        return found.st_mtime_ns, found.st_size, found.st_ino
+
+def _signature(path: Path) -> tuple[int, ...] | None:
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_mtime_ns, found.st_size, found.st_ino

@@ -199,7 +199,8 @@ def _node_of(value: Any, path: FieldPath, depth: int) -> Node:
         inner = nodes
     else:
         return Node(value, 0, 0, text=str(value))
-    return Node(inner, 0, 0, height=1 + max((node.height for node in nodes), default=0))
+    values = 1 + sum(node.values for node in nodes)
+    return Node(inner, 0, 0, values=values, height=1 + max((n.height for n in nodes), default=0))
 
 
 class _Reader:

@@ -7,12 +7,14 @@ model, with its default (lengths in quants) and its description, to which its li
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, get_args
 
 from pydantic import AfterValidator
 
-from roller_env.level import Level, level_json_schema
+from roller_env.level import level_json_schema
+from roller_env.level.prefab import LevelFile
 from roller_env.pieces.fields import Length, NonNegativeLength, Part, PositiveLength
 from roller_env.units import METRES_PER_QUANT
 
@@ -48,8 +50,8 @@ def table(name: str) -> str:
 
 
 def _models() -> dict[str, type[Part]]:
-    found: dict[str, type[Part]] = {}
-    open_models: list[Any] = [Level]
+    found: dict[str, type[Part]] = {"Level": LevelFile}
+    open_models: list[Any] = [field.annotation for field in LevelFile.model_fields.values()]
     while open_models:
         kind = open_models.pop()
         if isinstance(kind, type) and issubclass(kind, Part) and kind.__name__ not in found:
@@ -59,6 +61,9 @@ def _models() -> dict[str, type[Part]]:
     return found
 
 
+@cache
+@cache
+@cache
 def _schema(name: str) -> dict[str, Any]:
     whole = level_json_schema()
     return dict(whole if name == "Level" else whole["$defs"][name])

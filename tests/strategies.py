@@ -17,6 +17,7 @@ from roller_env.pieces.box import Box
 from roller_env.pieces.camera_trigger import CameraTrigger
 from roller_env.pieces.checkpoint import Checkpoint
 from roller_env.pieces.coin import CoinArc, CoinGrid, CoinLine, Coins
+from roller_env.pieces.curve import Bowl, HalfPipe, Spiral
 from roller_env.pieces.fields import METRES_PER_UNIT
 from roller_env.pieces.finish import Finish
 from roller_env.pieces.floor import FloorCell, FloorPlan
@@ -29,7 +30,7 @@ from roller_env.pieces.tube import Opening, Tube
 from roller_env.pieces.wall import Wall
 
 SLOT_M = 6.0
-Scenery = Box | Ramp | Wall | Hull | Wedge | Tube
+Scenery = Box | Ramp | Wall | Hull | Wedge | HalfPipe | Bowl | Spiral | Tube
 OVERHEAD_M = 20.0
 """Over all that is solid."""
 LANE_HALF_WIDTH_M = 3.0
@@ -128,6 +129,9 @@ def _lane(
         "walls": Wall,
         "hulls": Hull,
         "wedges": Wedge,
+        "half_pipes": HalfPipe,
+        "bowls": Bowl,
+        "spirals": Spiral,
         "tubes": Tube,
     }
     pieces: dict[str, Any] = {
@@ -158,7 +162,8 @@ def _scenery(draw: Draw, slot: int, origin: Origin, surface: st.SearchStrategy[s
     x, y, z = _moved(origin, (slot * SLOT_M, draw(st.sampled_from([-6.5, 6.5])), 0.0))
     size = draw(numbers(0.1, 2.0))
     material = draw(surface)
-    kind = draw(st.sampled_from([Box, Ramp, Wall, Hull, Wedge, Tube]))
+    kinds = [Box, Ramp, Wall, Hull, Wedge, HalfPipe, Bowl, Spiral, Tube]
+    kind = draw(st.sampled_from(kinds))
     if kind is Box:
         yaw, pitch = draw(numbers(-360.0, 360.0)), draw(numbers(-60.0, 60.0))
         edges = (size, draw(numbers(0.1, 3.0)), draw(numbers(0.1, 1.0)))
@@ -179,6 +184,26 @@ def _scenery(draw: Draw, slot: int, origin: Origin, surface: st.SearchStrategy[s
         own += draw(st.lists(st.tuples(*[numbers(-1.5, 1.5)] * 3), max_size=12))
         points = tuple(_moved((x, y, z), point) for point in own)
         return Hull(points=points, material=material)
+    if kind is HalfPipe:
+        end = (x + draw(numbers(0.2, 2.0)), y, z + draw(numbers(-1.0, 1.0)))
+        arc, faces = draw(numbers(20.0, 250.0)), draw(st.integers(2, 9))
+        return HalfPipe(
+            start=(x, y, z), end=end, radius=size, arc_deg=arc, segments=faces, material=material
+        )
+    if kind is Bowl:
+        rings = draw(st.integers(1, 3))
+        return Bowl(at=(x, y, z), radius=size, rings=rings, material=material)
+    if kind is Spiral:
+        return Spiral(
+            centre=(x, y, z),
+            radius=1.0,
+            width=draw(numbers(0.1, 1.0)),
+            rise=draw(numbers(-1.0, 1.0)),
+            turn_deg=draw(st.sampled_from([-200.0, 180.0, 500.0])),
+            bank_deg=draw(numbers(0.0, 45.0)),
+            segments=draw(st.integers(6, 12)),
+            material=material,
+        )
     opening = st.builds(Opening, toward_deg=numbers(-180, 180), width_deg=numbers(10.0, 90.0))
     return Tube(
         start=(x, y, z),

@@ -1,7 +1,7 @@
 // @vitest-environment node
 import { describe, expect, it } from "vitest";
+import { fakeFrame } from "./fakes";
 import { between, FrameBuffer, goesOn, slerp } from "./frames";
-import { frameOf } from "./testing";
 import type { Frame, Quat } from "./types";
 
 const RATE_HZ = 60;
@@ -9,7 +9,7 @@ const RATE_HZ = 60;
 /** Return the n-th frame of a ball that rolls along x at 3 m/s. */
 function rolling(n: number, change: Partial<Frame> = {}): Frame {
   const timeS = n / RATE_HZ;
-  return frameOf({ step: 4 * n, timeS, clockS: 100 + timeS, ball: [3 * timeS, 0, 0], ...change });
+  return fakeFrame({ step: 4 * n, timeS, clockS: 100 + timeS, ball: [3 * timeS, 0, 0], ...change });
 }
 
 describe("between two frames", () => {

@@ -33,6 +33,7 @@ class Replay {
   private speed = 1;
   private playing = true;
   private shownAtS: number | null = null;
+  private shownPlaceS = -1;
 
   constructor(
     root: HTMLElement,
@@ -82,17 +83,22 @@ class Replay {
     this.shownAtS = nowS;
     if (this.playing) this.go(this.placeS + this.speed * Math.max(elapsedS, 0));
     if (this.placeS === this.lastS) this.playing = false;
-    const place = this.placeS * this.recorded.rate_hz;
-    const before = this.frames[Math.floor(place)] as Frame;
-    const after = this.frames[Math.ceil(place)] as Frame;
-    const frame = {
-      ...between(before, after, place - Math.floor(place)),
-      phase: this.phase(),
-      speed: this.speed,
-    };
+    const [phase, before] = [this.phase(), this.page.view.frame];
+    const isShown = before?.phase === phase && before.speed === this.speed;
+    if (isShown && this.placeS === this.shownPlaceS) return before;
+    this.shownPlaceS = this.placeS;
+    const frame = { ...this.frameOf(this.placeS), phase, speed: this.speed };
     this.page.view.frame = frame;
-    this.page.view.result = frame.phase === "ended" ? this.result : null;
+    this.page.view.result = phase === "ended" ? this.result : null;
     return frame;
+  }
+
+  private frameOf(placeS: number): Frame {
+    const { frames } = this;
+    const place = Math.min(placeS * this.recorded.rate_hz, frames.length - 1);
+    const first = Math.floor(place);
+    const before = frames[first] as Frame;
+    return between(before, frames[first + 1] ?? before, place - first);
   }
 
   private phase(): Phase {

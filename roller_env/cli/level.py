@@ -30,6 +30,7 @@ from roller_env.level import (
     Level,
     LevelError,
     examine_level,
+    files_of,
     level_json_schema,
     levels_directory,
     load_level,
@@ -449,8 +450,8 @@ def look(file: Path, picture: Path, view: View, physics: Preset) -> None:
 
 
 def saves(file: Path) -> Iterator[None]:
-    """Yield at once, and then whenever a file has been saved; never ends."""
-    saved = SavedFile(file)
+    """Yield at once, and then whenever a file, or one that it includes, is saved; never ends."""
+    saved = SavedFile(file, files_of)
     while True:
         if saved.is_new():
             yield

@@ -5,10 +5,11 @@ from __future__ import annotations
 from roller_env.level.check import check_level
 from roller_env.level.doubts import level_warnings
 from roller_env.level.errors import LevelError, LevelWarning
+from roller_env.level.json_schema import level_json_schema
 from roller_env.level.load import (
     examine_level,
+    files_of,
     is_path,
-    level_json_schema,
     levels_directory,
     load_level,
     parse_level,
@@ -24,6 +25,7 @@ __all__ = [
     "Problem",
     "check_level",
     "examine_level",
+    "files_of",
     "is_path",
     "level_json_schema",
     "level_warnings",

@@ -11,30 +11,30 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from pydantic import ValidationError
-from pydantic.json_schema import GenerateJsonSchema
-from pydantic_core import CoreSchema
 
 from roller_env.assets import LEVELS, asset_directory
 from roller_env.level.check import check_level
 from roller_env.level.doubts import level_warnings
 from roller_env.level.errors import LevelError, LevelWarning
+from roller_env.level.include import SUFFIXES, with_included
 from roller_env.level.lint import lint
 from roller_env.level.messages import explain
+from roller_env.level.prefab import LevelFile, expanded
 from roller_env.level.reach import Play
 from roller_env.level.schema import Level
+from roller_env.level.source import File, Source
+from roller_env.level.text import decoded
 from roller_env.pieces.fields import METRES_PER_UNIT, SCALE_KEY
 from roller_env.pieces.words import Unit
 from roller_env.problems import Problem, listed, quoted
 from roller_env.regular_files import read_regular_file
 from roller_env.yaml_tree import MAX_BYTES, Node, YamlError, plain_tree, read_tree, uncollected
-
-SUFFIXES: Final = (".yaml", ".yml")
 
 
 def load_level(source: str | os.PathLike[str] | Level | Mapping[str, Any]) -> Level:
@@ -58,15 +58,11 @@ def load_level(source: str | os.PathLike[str] | Level | Mapping[str, Any]) -> Le
         _warn(level_warnings(source), stacklevel=3)
         return source
     if isinstance(source, Mapping):
-        try:
-            level, doubts = _examined(_tree(lambda: plain_tree(source)), "", "")
-        except LevelError as error:
-            raise LevelError(map(_without_a_place, error.problems)) from None
-        _warn(map(_without_a_place, doubts), stacklevel=3)
+        root = _tree(lambda: plain_tree(source))
+        level, doubts = _examined(_source(with_included(File("", "", root), None)))
+        _warn(doubts, stacklevel=3)
         return level
-    path = _path_of(source)
-    filename, text = str(path), decoded(_read(path), str(path))
-    level, doubts = _examined(_tree(lambda: read_tree(text, filename)), text, filename)
+    level, doubts = _examined(_source(_files(_path_of(source))))
     _warn(doubts, stacklevel=3)
     return level
 
@@ -85,12 +81,18 @@ def examine_level(source: str | os.PathLike[str], play: Play) -> tuple[Level, tu
     Raises:
         LevelError: it cannot be played.
     """
-    path = _path_of(source)
-    filename, text = str(path), decoded(_read(path), str(path))
-    root = _tree(lambda: read_tree(text, filename))
-    level, doubts = _examined(root, text, filename)
-    found = (_placed(problem, root, filename) for problem in lint(level, play, _unit(root)))
-    return level, tuple(_in_file_order((*doubts, *found)))
+    read = _source(_files(_path_of(source)))
+    level, doubts = _examined(read)
+    return level, tuple(_in_file_order((*doubts, *_told(lint(level, play, _unit(read)), read))))
+
+
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Return a level's file, and those that it includes, if all of them can be read."""
+    try:
+        _, *included = _files(path)
+    except LevelError:
+        return (path,)
+    return (path, *(Path(file.name) for file in included))
 
 
 def is_path(source: str) -> bool:
@@ -112,9 +114,22 @@ def parse_level(text: str, filename: str = "<text>") -> Level:
     Raises:
         LevelError: the level has problems; all of them are in ``problems``.
     """
-    level, doubts = _examined(_tree(lambda: read_tree(text, filename)), text, filename)
+    root = _tree(lambda: read_tree(text, filename))
+    level, doubts = _examined(_source(with_included(File(filename, text, root), None)))
     _warn(doubts, stacklevel=3)
     return level
+
+
+@uncollected()
+def _files(path: Path) -> list[File]:
+    filename, text = str(path), decoded(_read(path), str(path))
+    return with_included(File(filename, text, _tree(lambda: read_tree(text, filename))), path)
+
+
+@uncollected()
+def _source(files: Sequence[File]) -> Source:
+    """Return what a file says together with those that it includes, all copies made."""
+    return expanded(files, _unit_of(files[0].root))
 
 
 def _tree(read: Callable[[], Node]) -> Node:
@@ -126,15 +141,15 @@ def _tree(read: Callable[[], Node]) -> Node:
 
 
 @uncollected()
-def _examined(root: Node, text: str, filename: str) -> tuple[Level, list[Problem]]:
-    """Return the level that a tree says, if it is right in shape and in meaning, and its doubts."""
-    unit = _unit(root)
+def _examined(source: Source) -> tuple[Level, list[Problem]]:
+    """Return the level that was read, if it is right in shape and in meaning, and its doubts."""
+    unit = _unit(source)
     try:
-        level = Level.model_validate(root.plain(), context={SCALE_KEY: METRES_PER_UNIT[unit]})
+        level = Level.model_validate(source.fields, context={SCALE_KEY: METRES_PER_UNIT[unit]})
     except ValidationError as error:
-        raise LevelError(_in_file_order(explain(error, root, text, filename))) from None
-    _refuse(_placed(problem, root, filename) for problem in check_level(level, unit))
-    return level, [_placed(doubt, root, filename) for doubt in level_warnings(level, unit)]
+        raise LevelError(_in_file_order(explain(error, source, LevelFile))) from None
+    _refuse(_told(check_level(level, unit), source))
+    return level, _told(level_warnings(level, unit), source)
 
 
 def shipped_levels() -> tuple[str, ...]:
@@ -149,38 +164,6 @@ def levels_directory() -> Path:
         FileNotFoundError: the installation has lost it.
     """
     return asset_directory("levels")
-
-
-class _EditorSchema(GenerateJsonSchema):
-    """Pydantic's schema without the titles it makes of the field names, which say nothing."""
-
-    def field_title_should_be_set(self, schema: Any) -> bool:
-        return False
-
-    def generate(self, schema: CoreSchema, mode: Any = "validation") -> dict[str, Any]:
-        said: dict[str, Any] = _draft_07(super().generate(schema, mode))
-        return {"$schema": "http://json-schema.org/draft-07/schema#", **said}
-
-
-def level_json_schema() -> dict[str, Any]:
-    """Return the JSON Schema (draft 7) of a level file, for editors to complete from."""
-    schema = Level.model_json_schema(schema_generator=_EditorSchema)
-    schema["title"] = "Roller level"
-    schema["description"] = "A level of Roller; see docs/levels.md."
-    return schema
-
-
-def _draft_07(schema: Any) -> Any:
-    """Say lists of fixed length in the words of draft 7, which every editor understands."""
-    if isinstance(schema, list):
-        return [_draft_07(item) for item in schema]
-    if not isinstance(schema, dict):
-        return schema
-    said = {key: _draft_07(value) for key, value in schema.items()}
-    if "prefixItems" in said:
-        said["items"], *others = said.pop("prefixItems")
-        assert all(other == said["items"] for other in others), "a list of unlike items"
-    return said
 
 
 def _path_of(source: str | os.PathLike[str]) -> Path:
@@ -208,40 +191,19 @@ def _read(path: Path) -> bytes:
     raise LevelError([replace(problem, filename=str(path))])
 
 
-def decoded(data: bytes, filename: str) -> str:
-    """Return the text of a file that somebody wrote.
-
-    Args:
-        data: what is in it.
-        filename: what errors call it.
-
-    Raises:
-        LevelError: it is not UTF-8; says where.
-    """
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        before = data[: error.start]
-        line, column = before.count(b"\n") + 1, error.start - before.rfind(b"\n")
-        message = f"found the byte 0x{data[error.start]:02x}, which is not UTF-8; save it as UTF-8"
-        raise LevelError([Problem((), message, filename, line, column)]) from None
+def _unit(source: Source) -> Unit:
+    return _unit_of(source.own.node)
 
 
-def _unit(root: Node) -> Unit:
+def _unit_of(root: Node) -> Unit:
     """Return the unit that the file names; metres if it names none, or none there is."""
     node = root.find(("units",))
     return "quant" if node is not None and node.value == "quant" else "metre"
 
 
-def _placed(problem: Problem, root: Node, filename: str) -> Problem:
-    line, column = root.position(problem.path)
-    if line == 0:  # plain data, not a text
-        return problem
-    return replace(problem, filename=filename, line=line, column=column)
-
-
-def _without_a_place(problem: Problem) -> Problem:
-    return replace(problem, filename=None, line=None, column=None)
+def _told(problems: Iterable[Problem], source: Source) -> list[Problem]:
+    """Return problems of a level with their places; of those of many copies one."""
+    return list(dict.fromkeys(map(source.told, problems)))
 
 
 def _in_file_order(problems: Iterable[Problem]) -> list[Problem]:

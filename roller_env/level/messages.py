@@ -14,8 +14,8 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 from pydantic_core.core_schema import ErrorType
 
-from roller_env.level.schema import Level
-from roller_env.pieces.fields import COLOUR_PATTERN, NAME_PATTERN
+from roller_env.level.source import Source
+from roller_env.pieces.fields import COLOUR_PATTERN, NAME_PATTERN, Part
 from roller_env.problems import MAX_PROBLEMS, FieldPath, Problem, listed, quoted
 from roller_env.yaml_tree import Node
 
@@ -31,30 +31,30 @@ _LONG_TEXT: Final = 64
 Schema = dict[str, Any]
 
 
-def explain(error: ValidationError, root: Node, text: str, filename: str) -> list[Problem]:
-    """Return the error's findings as problems of the file, up to `MAX_PROBLEMS` of them.
+def explain(error: ValidationError, source: Source, model: type[Part]) -> list[Problem]:
+    """Return the error's findings as problems of the files, up to `MAX_PROBLEMS` of them.
 
     Args:
-        error: what pydantic says of the plain data of ``root``.
-        root: the file's tree.
-        text: the file's text.
-        filename: its name.
+        error: what pydantic says of the source's fields.
+        source: what was read.
+        model: what it should have been.
     """
     problems: dict[Problem, None] = {}
     for details in error.errors(include_url=False)[:MAX_PROBLEMS]:
-        problem = _in_words(details, root)
+        problem = _in_words(details, source, _whole(model))
         of_key = details["type"] == "extra_forbidden" or details["loc"][-1:] == ("[key]",)
-        line, column = root.position(problem.path, of_key=of_key)
-        if details["type"] in _PLAN_ROW_ERRORS:
-            line, column = _plan_place(root, problem.path, text, details["ctx"])
-        problems[replace(problem, filename=filename, line=line, column=column)] = None
+        told = source.told(problem, of_key)
+        if details["type"] in _PLAN_ROW_ERRORS and told.line:
+            line, column = _plan_place(source, problem.path, details["ctx"])
+            told = replace(told, line=line, column=column)
+        problems[told] = None
     more = error.error_count() - MAX_PROBLEMS
     if more > 0:
-        problems[Problem((), f"{more} more fields are wrong", filename)] = None
+        problems[Problem((), f"{more} more fields are wrong", source.own.file.name)] = None
     return list(problems)
 
 
-def _in_words(details: ErrorDetails, root: Node) -> Problem:
+def _in_words(details: ErrorDetails, source: Source, whole: Schema) -> Problem:
     """Return the problem without its place in the file."""
     path, kind = details["loc"], details["type"]
     if kind in _PLAN_ROW_ERRORS:
@@ -62,17 +62,17 @@ def _in_words(details: ErrorDetails, root: Node) -> Problem:
     if kind not in _PYDANTICS_OWN:
         return Problem(path, details["msg"])
     if kind == "extra_forbidden":
-        known = tuple(_schema_at(path[:-1]).get("properties", {}))
+        known = tuple(_schema_at(path[:-1], whole).get("properties", {}))
         message = f"unknown field {quoted(str(path[-1]))}; allowed: {', '.join(known)}"
         return Problem(path, message, written=str(path[-1]), known=known)
     if path and path[-1] == "[key]":
         name, allowed = quoted(str(path[-2])), _PATTERNS[NAME_PATTERN]
         return Problem(path[:-1], f"found the name {name}; allowed: {allowed}")
     if kind == "missing" and isinstance(path[-1], str):
-        return Problem(path, f"missing; wanted {_describe(_schema_at(path))}")
+        return Problem(path, f"missing; wanted {_describe(_schema_at(path, whole))}")
     if kind == "missing":  # an item of a list of fixed length
         path = path[:-1]
-    node, schema = root.find(path), _schema_at(path)
+    node, schema = source.find(path), _schema_at(path, whole)
     assert node is not None, "pydantic complains of a value, so the file has one"
     allowed = "a finite number" if kind == "finite_number" else _describe(schema)
     message = f"found {_found(node)}; allowed: {allowed}{_advice(node, schema)}"
@@ -101,20 +101,20 @@ def _advice(node: Node, schema: Schema) -> str:
     return ""
 
 
-def _plan_place(root: Node, path: FieldPath, text: str, found: dict[str, Any]) -> tuple[int, int]:
+def _plan_place(source: Source, path: FieldPath, found: dict[str, Any]) -> tuple[int, int]:
     """Return the position of a row, and of a strange character in it, of a plan drawn as a block.
 
     Args:
-        root: the file's tree.
+        source: what was read.
         path: the plan.
-        text: the file's text.
         found: ``number``, the row from 1, and perhaps ``character``, in quotes.
     """
-    line, column = root.position(path)
-    plan = root.find(path)
+    origin, rest = source.origin(path)
+    line, column = origin.node.position(rest)
+    plan = origin.node.find(rest)
     if plan is None or not plan.is_block:
         return line, column
-    lines = text.splitlines()
+    lines = origin.file.text.splitlines()
     row = line + found["number"] - 1
     indent = len(lines[row]) - len(lines[row].lstrip())
     strange = lines[row].find(found.get("character", "''")[1:-1], indent)
@@ -122,24 +122,24 @@ def _plan_place(root: Node, path: FieldPath, text: str, found: dict[str, Any]) -
 
 
 @cache
-def _level_schema() -> Schema:
-    return Level.model_json_schema()
+def _whole(model: type[Part]) -> Schema:
+    return model.model_json_schema()
 
 
-def _resolved(schema: Schema) -> Schema:
+def _resolved(schema: Schema, whole: Schema) -> Schema:
     """Follow references, and of "something or null" take the something."""
     while "$ref" in schema or "anyOf" in schema:
         if "$ref" in schema:
             name = schema["$ref"].removeprefix("#/$defs/")
-            schema = _level_schema()["$defs"][name]
+            schema = whole["$defs"][name]
         else:
             schema = next(choice for choice in schema["anyOf"] if choice.get("type") != "null")
     return schema
 
 
-def _schema_at(path: FieldPath) -> Schema:
-    """Return the schema of the field at ``path``."""
-    schema = _resolved(_level_schema())
+def _schema_at(path: FieldPath, whole: Schema) -> Schema:
+    """Return the schema of the field at ``path`` in a model's."""
+    schema = _resolved(whole, whole)
     for part in path:
         if isinstance(part, int):
             fixed = schema.get("prefixItems")
@@ -150,7 +150,7 @@ def _schema_at(path: FieldPath) -> Schema:
             (inner,) = schema["patternProperties"].values()
         else:
             inner = schema["additionalProperties"]
-        schema = _resolved(inner)
+        schema = _resolved(inner, whole)
     return schema
 
 

@@ -14,7 +14,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Final, Literal, get_args, get_origin
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationInfo,
+    field_validator,
+    model_serializer,
+)
 from pydantic_core import PydanticCustomError
 
 from roller_env.pieces.box import Box
@@ -22,6 +28,7 @@ from roller_env.pieces.bumper import Bumper
 from roller_env.pieces.camera_trigger import CameraTrigger
 from roller_env.pieces.checkpoint import Checkpoint
 from roller_env.pieces.coin import Coins
+from roller_env.pieces.curve import Bowl, HalfPipe, Spiral
 from roller_env.pieces.fan import Fan
 from roller_env.pieces.fields import (
     METRES_PER_UNIT,
@@ -55,6 +62,11 @@ from roller_env.pieces.wall import Wall
 from roller_env.units import quants
 
 MAX_PIECES: Final = 20_000
+
+
+LATER_KINDS: Final = ("half_pipes", "bowls", "spirals")
+"""Kinds that came when levels already went by the hash of their text, as records and checkpoints
+have it: a level without them is written as it always was."""
 
 
 class Material(Part):
@@ -158,6 +170,9 @@ class Level(Part):
     walls: tuple[Wall, ...] = ()
     hulls: tuple[Hull, ...] = ()
     wedges: tuple[Wedge, ...] = ()
+    half_pipes: tuple[HalfPipe, ...] = ()
+    bowls: tuple[Bowl, ...] = ()
+    spirals: tuple[Spiral, ...] = ()
     tubes: tuple[Tube, ...] = ()
     plates: tuple[Plate, ...] = ()
     switches: tuple[Switch, ...] = ()
@@ -194,6 +209,12 @@ class Level(Part):
         below = [piece for field in PIECE_FIELDS for piece in info.data.get(field, ())]
         ground = Ground(lambda: _solids(below))
         return tuple(piece.settled(ground) for piece in value)
+
+    @model_serializer(mode="wrap")
+    def _without_later_kinds(self, written: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave kinds out that came later, where a level has none: see `LATER_KINDS`."""
+        fields: dict[str, Any] = written(self)
+        return {name: f for name, f in fields.items() if f or name not in LATER_KINDS}
 
     def material(self, name: str) -> Material:
         """Return the material called ``name``, the level's own before the built-in one.

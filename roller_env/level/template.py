@@ -37,7 +37,8 @@ finish:
   at: [352, 0, 32]
   size: [32, 96, 64]
 
-# More to build with: boxes, ramps, walls, tubes, coins, plates and gates, lift_pads.
+# More to build with: boxes, ramps, walls, tubes, coins, plates and gates, lift_pads. What stands
+# there more than once is written once: prefabs and place.
 walls:
   - {{start: [412, -96], end: [412, 96], bottom: 0, height: 32}}
 

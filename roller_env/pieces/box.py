@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from pydantic import Field
 
-from roller_env.pieces.fields import Degrees, MaterialName, OptionalName, Point, Size
+from roller_env.pieces.fields import Degrees, MaterialName, OptionalName, Point, Size, Yaw
 from roller_env.pieces.piece import Piece, Solid, half_of, rotation_matrix
 
 
@@ -15,7 +15,7 @@ class Box(Piece):
 
     at: Point = Field(description="Its centre.")
     size: Size = Field(description="Full edge lengths along its own x, y and z.")
-    yaw_deg: Degrees = Field(0.0, description="Positive turns it to the left (+x towards +y).")
+    yaw_deg: Yaw = Field(0.0, description="Positive turns it to the left (+x towards +y).")
     pitch_deg: Degrees = Field(
         0.0, description="Positive tips its far (+x) end down. Pitch comes first, then yaw."
     )

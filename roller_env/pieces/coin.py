@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from roller_env.arrays import Bool, Float64, Int64
 from roller_env.compiled import device_function
-from roller_env.pieces.fields import Degrees, Part, PlanePoint, Point, PositiveLength
+from roller_env.pieces.fields import Part, Point, PositiveLength, Role, Spacing, Yaw
 from roller_env.pieces.look import Paint, Shape, Spin, part
 from roller_env.pieces.piece import Count, ExpandedLevel, Piece
 from roller_env.pieces.rules import (
@@ -61,8 +61,8 @@ class CoinArc(Part):
 
     centre: Point = Field(description="Of the circle.")
     radius: PositiveLength = Field(description="Of the circle.")
-    from_deg: Degrees = Field(description="Angle of the first coin: 0 is +x, 90 is +y.")
-    to_deg: Degrees = Field(description="Angle of the last coin.")
+    from_deg: Yaw = Field(description="Angle of the first coin: 0 is +x, 90 is +y.")
+    to_deg: Yaw = Field(description="Angle of the last coin.")
     count: Annotated[int, Field(strict=True, ge=2, le=MAX_COINS)] = Field(description="How many.")
 
 
@@ -70,10 +70,13 @@ class CoinGrid(Part):
     """Coins in level rows and columns round a centre."""
 
     centre: Point = Field(description="Of the grid.")
-    spacing: PlanePoint = Field(description="Distance between neighbours along x and y.")
-    count: tuple[
-        Annotated[int, Field(strict=True, ge=1, le=MAX_COINS)],
-        Annotated[int, Field(strict=True, ge=1, le=MAX_COINS)],
+    spacing: Spacing = Field(description="Distance between neighbours along x and y.")
+    count: Annotated[
+        tuple[
+            Annotated[int, Field(strict=True, ge=1, le=MAX_COINS)],
+            Annotated[int, Field(strict=True, ge=1, le=MAX_COINS)],
+        ],
+        Role.EXTENT,
     ] = Field(description="Coins along x and along y.")
 
     @model_validator(mode="after")

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from roller_env.arrays import Bool, Float64, Int64
-from roller_env.pieces.fields import Number, OptionalName, Point, Size
+from roller_env.pieces.fields import Number, OptionalName, Point, Role, Size
 from roller_env.pieces.look import ACTIVE, IDLE, Paint, Run, Shape, part
 from roller_env.pieces.piece import ExpandedLevel, Piece, Region, Vector, half_of
 from roller_env.pieces.rules import (
@@ -53,7 +53,9 @@ class Fan(Piece):
 
     at: Point = Field(description="Centre of the box.")
     size: Size = Field(description="Full edge lengths.")
-    force_n: tuple[Force, Force, Force] = Field(description="Newtons along x, y and z.")
+    force_n: Annotated[tuple[Force, Force, Force], Role.DIRECTION] = Field(
+        description="Newtons along x, y and z."
+    )
     blows: bool = Field(
         True, description="Whether it does at the start; plates and switches make it the contrary."
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import Annotated, Final
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo
@@ -59,6 +60,17 @@ def _to_metres_of_matter(value: float, info: ValidationInfo) -> float:
     return metres
 
 
+class Role(Enum):
+    """What becomes of a field when its piece is placed elsewhere, turned about the z axis."""
+
+    PLACE = "moved and turned: `[x, y, z]` or `[x, y]`"
+    DIRECTION = "turned: `[x, y, z]`"
+    EXTENT = "along the piece's own axes if it has an `ANGLE`, else along the level's"
+    HEIGHT = "moved: z"
+    ANGLE = "turned: degrees about z"
+    NAMES = "names of other pieces"
+
+
 # Bounds stand on the number itself, before any AfterValidator: only there does pydantic write them
 # into the JSON Schema as minimum and maximum.
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -68,9 +80,14 @@ PositiveLength = Annotated[Number, Field(gt=0.0), AfterValidator(_to_metres_of_m
 NonNegativeLength = Annotated[Number, Field(ge=0.0), AfterValidator(_to_metres_of_matter)]
 Seconds = Annotated[Number, Field(gt=0.0, le=86_400.0)]
 Degrees = Annotated[Number, Field(ge=-360.0, le=360.0)]
-Point = tuple[Length, Length, Length]
-PlanePoint = tuple[Length, Length]
-Size = tuple[PositiveLength, PositiveLength, PositiveLength]
+Yaw = Annotated[Degrees, Role.ANGLE]
+Height = Annotated[Length, Role.HEIGHT]
+Point = Annotated[tuple[Length, Length, Length], Role.PLACE]
+PlanePoint = Annotated[tuple[Length, Length], Role.PLACE]
+Spacing = Annotated[tuple[Length, Length], Role.EXTENT]
+Velocity = Annotated[tuple[Length, Length, Length], Role.DIRECTION]
+Size = Annotated[tuple[PositiveLength, PositiveLength, PositiveLength], Role.EXTENT]
+Names = Annotated[tuple[str, ...], Role.NAMES]
 Name = Annotated[str, Field(pattern=NAME_PATTERN)]
 OptionalName = Annotated[
     Name | None, Field(description="To find it by in messages; no two pieces share one.")

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import cached_property
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from roller_env.arrays import Float64
 from roller_env.pieces.fields import (
     MaterialName,
     NonNegativeLength,
+    Number,
     OptionalName,
     Part,
     Point,
     PositiveLength,
 )
 from roller_env.pieces.piece import UNTURNED, Count, Piece, Solid
+from roller_env.pieces.placing import CannotTurn, Frame
 from roller_env.problems import FieldPath
 from roller_env.units import quants
 
@@ -60,6 +63,30 @@ class FloorPlan(Piece):
         default_factory=dict, description="More characters, or other meanings of `#` and `o`."
     )
     name: OptionalName = None
+
+    @classmethod
+    def placed(cls, fields: Mapping[str, Any], frame: Frame) -> dict[str, Any]:
+        """Return its fields in a frame: its drawing turned by quarter turns, which are all it can.
+
+        Raises:
+            CannotTurn: it would have to be turned by something else.
+        """
+        plain = dict(fields)
+        quarters, rest = divmod(frame.yaw_deg % 360.0, 90.0)
+        if rest:
+            raise CannotTurn
+        with suppress(ValidationError):  # which is told when the floor is read
+            drawing = _Drawing.model_validate(fields)
+            rows, corner, cell = rows_of(drawing.plan), drawing.corner, drawing.cell
+            width, depth = len(rows[0]) * cell, len(rows) * cell
+            x, y = corner[:2]
+            lowest = ((x, y), (-y - width, x), (-x - depth, -y - width), (y, -x - depth))
+            plain["corner"] = [*lowest[int(quarters)], corner[2]]
+            for _ in range(int(quarters)):
+                rows = ["".join(column) for column in zip(*rows, strict=True)][::-1]
+            if quarters:
+                plain["plan"] = "\n".join(rows)
+        return super().placed(plain, Frame(frame.at))
 
     @field_validator("legend")
     @classmethod
@@ -103,9 +130,7 @@ class FloorPlan(Piece):
     @property
     def rows(self) -> list[str]:
         """The plan's rows, from the largest x to the smallest; a blank line is an empty row."""
-        lines = [line.rstrip() for line in self.plan.splitlines()]
-        empty = "." * len(next(filter(None, lines), ""))
-        return [line or empty for line in lines] if empty else []
+        return rows_of(self.plan)
 
     @cached_property
     def cells(self) -> dict[str, FloorCell]:
@@ -149,3 +174,26 @@ class FloorPlan(Piece):
                 if character != ".":
                     y = self.corner[1] + (len(row) - from_left - 0.5) * self.cell
                     yield self.cells[character], x, y
+
+
+def rows_of(plan: str) -> list[str]:
+    """Return a plan's rows, from the largest x to the smallest; a blank line is an empty row."""
+    lines = [line.rstrip() for line in plan.splitlines()]
+    empty = "." * len(next(filter(None, lines), ""))
+    return [line or empty for line in lines] if empty else []
+
+
+class _Drawing(BaseModel):
+    """What of a floor's fields is turned, in any unit; no drawing that is refused anyway."""
+
+    corner: tuple[Number, Number, Number]
+    cell: Number
+    plan: Annotated[str, Field(max_length=MAX_PLAN_CELLS)]
+    legend: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _is_sound(self) -> _Drawing:
+        rows, known = rows_of(self.plan), {".", "#", "o", *self.legend}
+        if not rows or len(set(map(len, rows))) > 1 or not known.issuperset("".join(rows)):
+            raise ValueError
+        return self

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from roller_env.arrays import Bool, Float64, Int64
-from roller_env.pieces.fields import Degrees, Length, Name, Point, PositiveLength, Size
+from roller_env.pieces.fields import Height, Name, Point, PositiveLength, Size, Yaw
 from roller_env.pieces.ground import Ground, settled
 from roller_env.pieces.look import ACTIVE, DONE, IDLE, Shape, part, states
 from roller_env.pieces.piece import (
@@ -56,8 +56,8 @@ class Gate(Piece):
     name: Name = Field(description="For its plates and switches; no two pieces share one.")
     at: Point = Field(description="Its centre while it is closed.")
     size: Size = Field(description="Full edge lengths.")
-    yaw_deg: Degrees = Field(0.0, description="Positive turns it to the left, as a box.")
-    lowers_to: Length | None = Field(
+    yaw_deg: Yaw = Field(0.0, description="Positive turns it to the left, as a box.")
+    lowers_to: Height | None = Field(
         None,
         description="Height of its centre when it is open. If left out, its upper face is then "
         "level with that of what it stands on; if it stands on nothing, -32 quants.",

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from roller_env.pieces.convex import ConvexSolid, sides_of
-from roller_env.pieces.fields import Degrees, MaterialName, OptionalName, Point, Size
+from roller_env.pieces.fields import MaterialName, OptionalName, Point, Size, Yaw
 from roller_env.pieces.piece import Piece, Solid, half_of, rotation_matrix
 
 
@@ -48,7 +48,7 @@ class Wedge(Piece):
 
     at: Point = Field(description="Centre of the box.")
     size: Size = Field(description="Full edge lengths of the box along its own x, y and z.")
-    yaw_deg: Degrees = Field(
+    yaw_deg: Yaw = Field(
         0.0, description="Positive turns it to the left; 90 makes it rise towards +y."
     )
     material: MaterialName = "default"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple, Self, TypeVar, cast
 
@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from roller_env.arrays import Float64
 from roller_env.pieces.fields import Part
+from roller_env.pieces.placing import Frame, place_fields
 from roller_env.problems import FieldPath, Problem
 from roller_env.units import SCRIPT_RATE_HZ
 
@@ -188,6 +189,11 @@ class Piece(Part):
     is_searched: ClassVar[bool] = True
     is_pipe: ClassVar[bool] = False
     rules: ClassVar[Rules[Any, Any] | None] = None
+
+    @classmethod
+    def placed(cls, fields: Mapping[str, Any], frame: Frame) -> dict[str, Any]:
+        """Return the fields of one, as a file has them, in a frame; see `place_fields`."""
+        return place_fields(cls, fields, frame)
 
     def count(self) -> Count:
         """Return how much it stands for, without making it."""

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from roller_env.arrays import Bool, Float64
-from roller_env.pieces.fields import Length, Name, Point, PositiveLength, Size
+from roller_env.pieces.fields import Height, Name, Names, Point, PositiveLength, Size
 from roller_env.pieces.ground import Ground, settled
 from roller_env.pieces.look import ACTIVE, DONE, IDLE, Shape, part, states
 from roller_env.pieces.piece import (
@@ -67,10 +67,10 @@ class Plate(Piece):
     name: Name = Field(description="No two pieces share one.")
     at: Point = Field(description="Its centre before it sinks.")
     size: Size = Field(description="Full edge lengths.")
-    opens: tuple[str, ...] = Field(
+    opens: Names = Field(
         description="The names of its gates, or of platforms and fans that it starts; at least one."
     )
-    sinks_to: Length | None = Field(
+    sinks_to: Height | None = Field(
         None,
         description="Height of its centre when it is down. If left out, 13 quants under the upper "
         "face of what it stands on, as in the original; if it stands on nothing, 67 quants.",

@@ -12,13 +12,13 @@ from pydantic import Field
 from roller_env.arrays import Bool, Float64, Int64
 from roller_env.compiled import device_function
 from roller_env.pieces.fields import (
-    Degrees,
     MaterialName,
     Name,
     Number,
     Point,
     PositiveLength,
     Size,
+    Yaw,
 )
 from roller_env.pieces.look import ACTIVE, IDLE, Shape, part, states
 from roller_env.pieces.piece import (
@@ -66,7 +66,7 @@ class Platform(Piece):
     at: Point = Field(description="Its centre at the start.")
     to: Point = Field(description="Its centre at the other end.")
     size: Size = Field(description="Full edge lengths.")
-    yaw_deg: Degrees = Field(0.0, description="Positive turns it to the left, as a box.")
+    yaw_deg: Yaw = Field(0.0, description="Positive turns it to the left, as a box.")
     speed: PositiveLength = Field(quants(48.0), description="Length per second.")
     wait_s: Annotated[Number, Field(ge=0.0, le=86_400.0)] = Field(
         1.0, description="How long it stands at either end; at the first not at the beginning."

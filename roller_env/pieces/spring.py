@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from roller_env.arrays import Float64
-from roller_env.pieces.fields import Length, OptionalName, Point, Size
+from roller_env.pieces.fields import OptionalName, Point, Size, Velocity
 from roller_env.pieces.look import Paint, Shape, part
 from roller_env.pieces.piece import ExpandedLevel, Piece, Region, Vector, half_of
 from roller_env.pieces.rules import (
@@ -47,7 +47,7 @@ class Spring(Piece):
 
     at: Point = Field(description="Its centre.")
     size: Size = Field(description="Full edge lengths.")
-    velocity: tuple[Length, Length, Length] = Field(description="Length per second, x, y and z.")
+    velocity: Velocity = Field(description="Length per second, x, y and z.")
     name: OptionalName = None
 
     def region(self, touch: float) -> Region:

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from roller_env.arrays import Bool, Float64, Int64
-from roller_env.pieces.fields import OptionalName, Point, Seconds, Size
+from roller_env.pieces.fields import Names, OptionalName, Point, Seconds, Size
 from roller_env.pieces.look import ACTIVE, IDLE, Shape, part, states
 from roller_env.pieces.piece import ExpandedLevel, Piece, Region, Vector, half_of
 from roller_env.pieces.rules import (
@@ -46,7 +46,7 @@ class Switch(Piece):
 
     at: Point = Field(description="Its centre.")
     size: Size = Field(description="Full edge lengths.")
-    sets: tuple[str, ...] = Field(description="The names of what it switches, at least one.")
+    sets: Names = Field(description="The names of what it switches, at least one.")
     mode: Mode = Field("toggle", description="How long it is on.")
     duration_s: Seconds = Field(5.0, description="For `timed`: how long.")
     name: OptionalName = None

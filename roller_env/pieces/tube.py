@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, ClassVar, Final
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BaseModel, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from roller_env.arrays import Float64
@@ -22,7 +23,8 @@ from roller_env.pieces.fields import (
     PositiveLength,
 )
 from roller_env.pieces.look import LIGHT, Paint, Run, Shape, part
-from roller_env.pieces.piece import Count, Piece, Solid
+from roller_env.pieces.piece import Count, Piece, Solid, Vector
+from roller_env.pieces.placing import Frame
 from roller_env.pieces.surfaces import Surface, full_turn, lathe
 from roller_env.problems import FieldPath, Problem
 from roller_env.units import quants
@@ -75,15 +77,25 @@ class Tube(Piece):
             raise PydanticCustomError("tube_without_length", "start and end must differ")
         return self
 
+    @classmethod
+    def placed(cls, fields: Mapping[str, Any], frame: Frame) -> dict[str, Any]:
+        """Return its fields in a frame: the opening of an upright one is turned as well."""
+        found = super().placed(fields, frame)
+        with suppress(ValidationError):  # which is told when the tube is read
+            slot = _Slot.model_validate(fields)
+            if _is_upright(_along(slot.start, slot.end)):
+                toward_deg = math.remainder(slot.opening.toward_deg + frame.yaw_deg, 360.0)
+                found["opening"] = {**fields["opening"], "toward_deg": toward_deg}
+        return found
+
     @property
     def frame(self) -> Float64:
         """Its axes, (3, 3), columns: angle zero, angle 90 degrees, along the pipe.
 
         Angles count from +x towards +y for an upright tube, from straight up for a lying one.
         """
-        axis = np.subtract(self.end, self.start)
-        axis /= np.linalg.norm(axis)
-        upright = abs(axis[2]) > 0.999
+        axis = _along(self.start, self.end)
+        upright = _is_upright(axis)
         reference = np.array([1.0, 0.0, 0.0]) if upright else np.array([0.0, 0.0, 1.0])
         zero = reference - axis * (axis @ reference)
         zero /= np.linalg.norm(zero)
@@ -173,3 +185,23 @@ class Tube(Piece):
             angle = math.atan2(out @ frame[:, 1], out @ frame[:, 0])
             arcs.append(lathe(profile, np.array([angle - half_angle, angle + half_angle])))
         return Surface.joined(arcs)
+
+
+class _Slot(BaseModel):
+    """What of a tube's fields says whether its opening is turned with it, in any unit."""
+
+    start: tuple[Number, Number, Number]
+    end: tuple[Number, Number, Number]
+    opening: Opening
+
+
+def _along(start: Vector, end: Vector) -> Float64:
+    """Return the unit vector from one end to the other."""
+    axis: Float64 = np.subtract(end, start)
+    axis /= np.linalg.norm(axis)
+    return axis
+
+
+def _is_upright(axis: Float64) -> bool:
+    """Say whether a tube is so steep that its angles count from +x, not from straight up."""
+    return bool(abs(axis[2]) > 0.999)

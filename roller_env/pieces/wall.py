@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 
 from roller_env.pieces.fields import (
     MIN_LENGTH_M,
-    Length,
+    Height,
     MaterialName,
     OptionalName,
     PlanePoint,
@@ -25,7 +25,7 @@ class Wall(Piece):
 
     start: PlanePoint = Field(description="`[x, y]` of one end of its middle line.")
     end: PlanePoint = Field(description="`[x, y]` of the other end.")
-    bottom: Length = Field(description="Height of its lower edge.")
+    bottom: Height = Field(description="Height of its lower edge.")
     height: PositiveLength = Field(description="Upwards from there.")
     thickness: PositiveLength = Field(
         quants(8.0), description="Half of it to either side of the line."

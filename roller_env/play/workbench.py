@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from roller_env.game.actions import hardest_play
-from roller_env.level import Level, LevelError, examine_level, load_level
+from roller_env.level import Level, LevelError, examine_level, files_of, load_level
 from roller_env.physics.presets import physics_preset
 from roller_env.play.room import Message, Offer, Room
 from roller_env.play.server import listen, serve
@@ -49,7 +49,7 @@ class Workbench:
         """Put the file there as it stands."""
         self._file, self._physics = file, physics
         self._play = hardest_play(physics_preset(physics))
-        self._saved = SavedFile(file)
+        self._saved = SavedFile(file, files_of)
         self._saved.is_new()
         level, problems = self._examined()
         offer = Offer(str(file), level or load_level(STAND_IN))

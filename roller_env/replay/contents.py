@@ -202,7 +202,7 @@ class Replay:
     @cached_property
     def level_hash(self) -> str:
         """See `level_hash`."""
-        return level_hash(self.level)
+        return _hash(self.level_text)
 
     @cached_property
     def environment_key(self) -> tuple[str, str]:
@@ -246,7 +246,11 @@ def canonical_text(level: Level) -> str:
 
 def level_hash(level: Level) -> str:
     """Return the SHA-256 of `canonical_text`, hexadecimal: equal levels, equal hash."""
-    return hashlib.sha256(canonical_text(level).encode()).hexdigest()
+    return _hash(canonical_text(level))
+
+
+def _hash(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def check_game(options: EnvConfig, start: tuple[float, float, float], steps: int) -> None:

@@ -169,6 +169,16 @@ def test_a_save_is_seen_whether_it_is_written_over_or_put_in_place(here: Path) -
     next(seen)
 
 
+def test_a_save_of_an_included_file_is_seen(here: Path) -> None:
+    file, parts = here / "good.yaml", here / "parts.yaml"
+    parts.write_text("units: quant\n")
+    file.write_text(SMALL + "include: [parts.yaml]\n")
+    seen = saves(file)
+    next(seen)
+    parts.write_text("units: quant\nboxes: []\n")
+    next(seen)
+
+
 def test_a_file_that_is_not_there_yet_is_looked_at_once_and_again_when_it_is(here: Path) -> None:
     file = here / "later.yaml"
     seen = saves(file)

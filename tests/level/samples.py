@@ -66,6 +66,29 @@ hulls:
     name: rock
 wedges:
   - {at: [150, 60, 4], size: [32, 32, 8], yaw_deg: 90, material: ice, name: kicker}
+half_pipes:
+  - start: [300, -300, 0]
+    end: [500, -300, 10]
+    radius: 60
+    arc_deg: 160
+    segments: 8
+    thickness: 8
+    material: ice
+    name: trough
+bowls:
+  - {at: [700, -400, 0], radius: 90, arc_deg: 120, rings: 2, thickness: 8, material: ice, name: cup}
+spirals:
+  - centre: [1200, -400, 0]
+    radius: 100
+    width: 64
+    rise: 50
+    from_deg: 90
+    turn_deg: 180
+    bank_deg: 10
+    segments: 12
+    thickness: 8
+    material: ice
+    name: winding
 tubes:
   - start: [300, 300, 0]
     end: [300, 300, 900]

@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 
 from roller_env.level import Level, level_json_schema, levels_directory, shipped_levels
 from tests.level.samples import COMPLETE, SMALL
+from tests.level.test_robustness import PLACED_DATA
 from tests.strategies import as_yaml, levels
 
 VALIDATOR = jsonschema.Draft7Validator(level_json_schema())
@@ -42,6 +43,7 @@ def test_the_schema_is_itself_well_formed() -> None:
 def test_editors_accept_what_the_loader_accepts() -> None:
     assert objections(SMALL) == []
     assert objections(COMPLETE) == []
+    assert objections(yaml.safe_dump(PLACED_DATA)) == []
     for name in shipped_levels():
         text = (levels_directory() / f"{name}.yaml").read_text(encoding="utf-8")
         assert objections(text) == []
@@ -63,6 +65,9 @@ def test_editors_accept_every_valid_level(level: Level) -> None:
         ("coins: [{}]", "$.coins[0]"),
         ("coins: [{at: [1, 2]}]", "$.coins[0].at"),
         ("materials: {ice: {colour: red}}", "$.materials.ice.colour"),
+        ("place: [{of: a, repeat: {count: 0}}]", "$.place[0].repeat"),
+        ("prefabs: {a: {boxs: []}}", "$.prefabs.a"),
+        ("prefabs: {a: {boxes: [{att: 0}]}}", "$.prefabs.a.boxes[0]"),
         ("camera_triggers: [{kind: over, at: [0, 0, 0]}]", "$.camera_triggers[0].kind"),
     ],
 )

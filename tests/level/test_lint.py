@@ -29,7 +29,7 @@ from tests.strategies import levels
 
 SOLID_KINDS = (
     *("floors", "boxes", "ramps", "walls", "hulls", "wedges", "tubes"),
-    *("lift_pads", "bumpers"),
+    *("half_pipes", "bowls", "spirals", "lift_pads", "bumpers"),
 )
 RADIUS = quants(16.0)
 PLATE = {"name": "plate", "at": (3.0, 0.0, 0.25), "size": (1.0, 1.0, 0.5), "sinks_to": 0.1}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import os
 import pickle
 import time
@@ -582,3 +583,11 @@ def test_the_complete_sample_sets_every_field_there_is() -> None:
 
 def test_a_file_that_pyyaml_writes_reads_as_the_one_it_read() -> None:
     assert parse_level(yaml.safe_dump(yaml.safe_load(COMPLETE))) == parse_level(COMPLETE)
+
+
+def test_the_text_of_a_level_is_what_it_was_before_there_were_curved_floors() -> None:
+    """Records, ghosts and checkpoints go by its hash."""
+    text = load_level("classic").model_dump_json()
+    assert hashlib.sha256(text.encode()).hexdigest().startswith("97a41b8880b867cb")
+    pipe = {"start": (30, 0, 0), "end": (40, 0, 0), "radius": 3}
+    assert '"half_pipes":[{' in small_level(half_pipes=[pipe]).model_dump_json()

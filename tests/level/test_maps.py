@@ -799,5 +799,5 @@ def test_a_map_can_say_all_of_a_level_but_what_the_page_says() -> None:
     pieces = {kind.field for kind in KINDS.values()} | {"boxes", "hulls"}
     whole = {key.field for key in WORLD.values()} | {"name", "units", "materials"}
     parts = {"ball", "start", "finish", "route"}
-    solids = {"floors", "ramps", "walls", "tubes", "wedges"}
+    solids = {"floors", "ramps", "walls", "tubes", "wedges", "half_pipes", "bowls", "spirals"}
     assert pieces | whole | parts | solids | {"camera_triggers"} == set(Level.model_fields)

@@ -20,6 +20,18 @@ SYNTAX = st.text("{}[]:,-&*!|>'\"#%@`?~<= \n\ta01.\\xu\0\x85\ufeff", max_size=60
 pytestmark = pytest.mark.filterwarnings("ignore::roller_env.level.LevelWarning")
 
 COMPLETE_DATA = yaml.safe_load(COMPLETE)
+PLACED_DATA = yaml.safe_load(SMALL) | yaml.safe_load("""\
+prefabs:
+  post: {parameters: {high: 30}, boxes: [{at: [5, 0, 15], size: [9, 9, $high], name: post}]}
+  room:
+    floors: [{corner: [0, 0, 0], cell: 64, plan: "#o"}]
+    switches: [{at: [9, 9, 9], size: [1, 2, 3], sets: [fan]}]
+    fans: [{at: [9, 9, 90], size: [1, 2, 3], force_n: [1, 2, 3], name: fan}]
+    place: [{of: post, at: [1, 2, 3], yaw_deg: 30, parameters: {high: 9}}]
+place:
+  - {of: room, at: [900, 0, 0], yaw_deg: 90, name: east}
+  - {pieces: {coins: [{at: [9, 0, 16]}]}, repeat: {count: 3, step: [9, 0, 0], turn_deg: 20}}
+""")
 JUNK: st.SearchStrategy[Any] = st.recursive(
     st.none()
     | st.booleans()
@@ -82,11 +94,13 @@ def paths_of(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 @settings(deadline=None)
-@given(st.data())
-def test_a_level_with_junk_at_any_field_gives_a_level_or_a_level_error(data: st.DataObject) -> None:
-    level = copy.deepcopy(COMPLETE_DATA)
+@given(st.data(), st.sampled_from([COMPLETE_DATA, PLACED_DATA]))
+def test_a_level_with_junk_at_any_field_gives_a_level_or_a_level_error(
+    data: st.DataObject, sound: dict[str, Any]
+) -> None:
+    level: Any = copy.deepcopy(sound)
     *outer, last = data.draw(st.sampled_from([path for path in paths_of(level) if path]))
-    parent = level
+    parent: Any = level
     for part in outer:
         parent = parent[part]
     change = data.draw(st.sampled_from(["delete", "replace", "rename", "repeat"]))

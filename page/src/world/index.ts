@@ -4,9 +4,11 @@ import {
   AmbientLight,
   DirectionalLight,
   HemisphereLight,
+  Matrix4,
   PCFShadowMap,
   PerspectiveCamera,
   PMREMGenerator,
+  Quaternion,
   Vector3,
   WebGLRenderer,
   type WebGLRenderTarget,
@@ -35,6 +37,11 @@ const LEAST_WIDTH_OF_VIEW = 60;
 const SUN = new Vector3(0.42, -0.3, -0.86).normalize();
 const TOWARDS_SUN = SUN.clone().negate();
 const SUN_DISTANCE_M = 30;
+/** From the frame of who looks from the sun, as its shadow's camera does, to the world's. */
+const FROM_SUN = new Quaternion().setFromRotationMatrix(
+  new Matrix4().lookAt(TOWARDS_SUN, new Vector3(), new Vector3(0, 1, 0)),
+);
+const TO_SUN = FROM_SUN.clone().invert();
 /** Half edge of the square round the ball in which the sun casts shadows. */
 const SHADOW_REACH_M = 14;
 const SHADOW_PIXELS = 2048;
@@ -163,7 +170,8 @@ export class World {
   /** Return whether a picture may be left out: the processor that would draw it is the game's, too. */
   private canWait(drawn: Drawn, frame: Frame, settings: Settings, elapsedS: number): boolean {
     if (elapsedS < SOFTWARE_FRAME_S) return true;
-    return frame === drawn.frame && settings === drawn.settings && settings.camera !== "orbit";
+    const isTurned = this.dragged || settings.camera === "orbit";
+    return frame === drawn.frame && settings === drawn.settings && !isTurned;
   }
 
   private look(frame: Frame, wanted: CameraChoice, elapsedS: number): CameraChoice {
@@ -237,10 +245,13 @@ export class World {
   /** Let the sun cast its shadows round the ball. */
   private light(frame: Frame): void {
     const texel = (2 * SHADOW_REACH_M) / SHADOW_PIXELS;
-    // By whole texels, or edges of shadows would crawl.
-    const [x, y, z] = frame.ball.map((place) => Math.round(place / (8 * texel)) * 8 * texel);
-    this.sun.target.position.set(x ?? 0, y ?? 0, z ?? 0);
-    this.sun.position.copy(this.sun.target.position).addScaledVector(SUN, -SUN_DISTANCE_M);
+    const { position: middle } = this.sun.target;
+    // By whole texels as the sun sees them, or edges of shadows would crawl.
+    middle.set(...frame.ball).applyQuaternion(TO_SUN);
+    middle.x = Math.round(middle.x / texel) * texel;
+    middle.y = Math.round(middle.y / texel) * texel;
+    middle.applyQuaternion(FROM_SUN);
+    this.sun.position.copy(middle).addScaledVector(TOWARDS_SUN, SUN_DISTANCE_M);
   }
 }
 

@@ -1,7 +1,7 @@
 // @vitest-environment node
 import { Vector3 } from "three";
 import { describe, expect, it } from "vitest";
-import { frameOf, sceneOf } from "../testing";
+import { fakeFrame, fakeScene } from "../fakes";
 import type { Shape, Vec3 } from "../types";
 import { Solids } from "./solids";
 
@@ -28,7 +28,7 @@ const tilted = box([20, 0, 0], [3, 3, 0.5], {
 });
 const lift = box([0, 20, 0], [1, 1, 0.25], { look: ["metal/"], is_material: false, mover: 0 });
 const glass = box([0, -20, 2], [1, 1, 1], { look: ["glass"] });
-const scene = sceneOf({
+const scene = fakeScene({
   materials: {
     deck: { colour: "#808080", pattern: "plain" },
     glass: { colour: "#ffffff80", pattern: "plain" },
@@ -59,7 +59,7 @@ describe("the ground below a point", () => {
 
   it("is what moves, too, wherever it is just then", () => {
     expect(below(0, 20, 5)?.height).toBeCloseTo(0.25, 3);
-    solids.show(frameOf({ displacements: new Float32Array([2]) }));
+    solids.show(fakeFrame({ displacements: new Float32Array([2]) }));
     expect(below(0, 20, 5)?.height).toBeCloseTo(2.25, 3);
     expect(below(0, 20, 1)).toBeNull();
   });

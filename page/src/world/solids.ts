@@ -72,10 +72,10 @@ export class Solids {
         ground.normal.fromArray(n, 3 * i);
       }
     }
-    const down = new Vector3(0, 0, -1000);
     for (const block of this.blocks) {
-      const height = point.z + down.z * reach(block, point, down);
-      if (height > ground.height && height > point.z + down.z) {
+      const share = reach(block, point, DOWN);
+      const height = point.z + share * DOWN.z;
+      if (share < 1 && height > ground.height) {
         ground.height = height;
         ground.normal.set(0, 0, 1);
       }
@@ -231,6 +231,7 @@ function key(x: number, y: number): number {
   return 65536 * (x + 32768) + (y + 32768);
 }
 
+const DOWN = new Vector3(0, 0, -1000);
 const A = new Vector3();
 const E1 = new Vector3();
 const E2 = new Vector3();

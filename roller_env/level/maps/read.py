@@ -20,7 +20,7 @@ import numpy as np
 from roller_env.arrays import Float64
 from roller_env.level.doubts import level_warnings
 from roller_env.level.errors import LevelError, LevelWarning
-from roller_env.level.load import decoded, load_level
+from roller_env.level.load import load_level
 from roller_env.level.maps.brushes import Block, BrushError, Hull, body_of
 from roller_env.level.maps.entities import (
     BALL,
@@ -47,6 +47,7 @@ from roller_env.level.maps.entities import (
 )
 from roller_env.level.maps.parse import MAX_BYTES, Brush, Entity, parse_entities
 from roller_env.level.schema import Level
+from roller_env.level.text import decoded
 from roller_env.pieces.fields import NAME_PATTERN
 from roller_env.problems import MAX_PROBLEMS, FieldPath, Problem, listed, quoted
 from roller_env.regular_files import read_regular_file

@@ -62,8 +62,8 @@ class ExportedMap:
 def export_map(level: Level) -> ExportedMap:
     """Return a level as a map that `read_map` makes a level of with equal solids and pieces.
 
-    Floors, ramps, walls and tubes become the boxes that they consist of, wedges become hulls; coins
-    come one by one.
+    Floors, ramps, walls and tubes become the boxes that they consist of, wedges and curved floors
+    become hulls; coins come one by one.
 
     Args:
         level: the level, lengths in metres.

@@ -1,8 +1,8 @@
 // @vitest-environment node
 import { Vector3 } from "three";
 import { beforeEach, describe, expect, it } from "vitest";
-import { frameOf, sceneOf } from "../../testing";
-import type { Scene, Shape, Vec3 } from "../../types";
+import { fakeFrame, fakeScene } from "../../fakes";
+import type { Shape, Vec3 } from "../../types";
 import { Solids } from "../solids";
 import { newEye, yawOf } from "./eye";
 import { FollowCamera } from "./follow";
@@ -27,8 +27,8 @@ function wall(at: Vec3, half: Vec3): Shape {
 }
 
 function solidsOf(...shapes: Shape[]): Solids {
-  const scene: Scene = sceneOf({ shapes });
-  return new Solids(scene);
+  const materials = { deck: { colour: "#808080", pattern: "plain" } } as const;
+  return new Solids(fakeScene({ materials, shapes }));
 }
 
 describe("the camera that follows", () => {
@@ -37,7 +37,7 @@ describe("the camera that follows", () => {
   const open = solidsOf();
   const go = (velocity: Vec3, seconds: number, solids = open, ball: Vec3 = [0, 0, 0]) => {
     for (let s = 0; s < seconds; s += DT_S) {
-      camera.look(frameOf({ ball, velocity }), solids, DT_S, eye);
+      camera.look(fakeFrame({ ball, velocity }), solids, DT_S, eye);
     }
   };
 
@@ -54,7 +54,7 @@ describe("the camera that follows", () => {
 
   it("turns to where the ball rolls, to either side", () => {
     for (const angle of [0.5, 1.5, -1, -1.7]) {
-      camera.cut(frameOf());
+      camera.cut(fakeFrame());
       go([4 * Math.cos(angle), 4 * Math.sin(angle), 0], 4);
       expect(Math.cos(yawOf(eye) - angle)).toBeGreaterThan(0.99);
     }
@@ -73,7 +73,7 @@ describe("the camera that follows", () => {
     const ball: [number, number, number] = [0, 0, 0];
     const velocity: [number, number, number] = [0, 0.05, 0];
     for (let s = 0; s < 4; s += DT_S) {
-      camera.look(frameOf({ ball, velocity }), open, DT_S, eye);
+      camera.look(fakeFrame({ ball, velocity }), open, DT_S, eye);
       // Pushed at 3 m/s2 along the nearest of eight directions, as the keys do.
       const way = Math.round((yawOf(eye) + Math.PI) / (Math.PI / 4)) * (Math.PI / 4);
       velocity[0] += 3 * DT_S * Math.cos(way);
@@ -105,7 +105,7 @@ describe("the camera that follows", () => {
 
   it("looks along the way at once where another moment is shown", () => {
     go([4, 0, 0], 1);
-    camera.cut(frameOf({ velocity: [0, -3, 0] }));
+    camera.cut(fakeFrame({ velocity: [0, -3, 0] }));
     go([0, -3, 0], DT_S);
     expect(yawOf(eye)).toBeCloseTo(-Math.PI / 2, 1);
   });
@@ -113,7 +113,7 @@ describe("the camera that follows", () => {
   it("stands in a pause", () => {
     go([0, 4, 0], 0.3);
     const { x, y, z } = eye.position;
-    camera.look(frameOf({ velocity: [0, 4, 0] }), open, 0, eye);
+    camera.look(fakeFrame({ velocity: [0, 4, 0] }), open, 0, eye);
     expect(eye.position.toArray()).toEqual([x, y, z]);
   });
 
@@ -131,7 +131,7 @@ describe("the camera that follows", () => {
     const behind = wall([-1.5, 0, 0], [0.1, 5, 5]);
     const roof = wall([0, 0, 1.6], [5, 5, 0.1]);
     for (const solids of [solidsOf(behind), solidsOf(roof), solidsOf(behind, roof)]) {
-      camera.cut(frameOf());
+      camera.cut(fakeFrame());
       go([0, 0, 0], 3, solids);
       const ball = new Vector3(0, 0, 0);
       const way = eye.position.clone().sub(ball);

@@ -1,6 +1,6 @@
 // @vitest-environment node
 import { beforeEach, describe, expect, it } from "vitest";
-import { frameOf } from "../../testing";
+import { fakeFrame } from "../../fakes";
 import type { Frame } from "../../types";
 import { newEye } from "./eye";
 import { BEHIND, FIRST_PERSON, FRONT, GameCamera, OVERHEAD, RETREAT } from "./game";
@@ -11,7 +11,7 @@ describe("the game's camera", () => {
   let camera: GameCamera;
   const eye = newEye();
   const look = (frame: Partial<Frame>, chosen: number | null = null, elapsedS = 0) =>
-    camera.look(frameOf({ ball: [1, 2, 3], ...frame }), chosen, elapsedS, eye);
+    camera.look(fakeFrame({ ball: [1, 2, 3], ...frame }), chosen, elapsedS, eye);
 
   beforeEach(() => {
     camera = new GameCamera();

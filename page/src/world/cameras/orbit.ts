@@ -11,6 +11,8 @@ const LOWEST = -1.4;
 const HIGHEST = 1.5;
 const RAD_PER_PIXEL = 0.006;
 const ZOOM_PER_PIXEL = 0.0012;
+/** A shorter one is a click. */
+const DRAG_PIXELS = 8;
 const MARGIN_M = 0.3;
 
 export class OrbitCamera {
@@ -36,8 +38,10 @@ export class OrbitCamera {
       const before = this.fingers.get(event.pointerId);
       if (before === undefined) return;
       const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
-      if (dx === 0 && dy === 0) return;
-      if (!isOn()) onDrag();
+      if (!isOn()) {
+        if (Math.hypot(dx, dy) < DRAG_PIXELS) return;
+        onDrag();
+      }
       if (this.fingers.size === 1) this.turn(dx, dy);
       else this.pinch(event);
       this.fingers.set(event.pointerId, event);
