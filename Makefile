@@ -14,13 +14,17 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 # Other environments, to be measured beside this one; never mixed with what Roller needs.
 PEERS  := .venv-peers
+# Ray, which pins another Gymnasium.
+CLUSTER := .venv-cluster
 # One environment for each supported Python.
 MATRIX := .venv-matrix
+# One for each library that is tried on Roller; each goes when it has been.
+CLIENTS := .venv-clients
 # Newer than both files it depends on exactly when the environment is complete.
 READY  := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup train play test coverage matrix lint format page docs benchmark clean
+.PHONY: help setup train play test coverage matrix cluster clients lint format page docs dist benchmark clean
 .DELETE_ON_ERROR:
 
 help: ## show this list
@@ -63,10 +67,28 @@ coverage: $(READY) ## run the tests, and say which lines of the package they lea
 matrix: $(READY) ## try the wheel with every supported Python found here, and the oldest Gymnasium
 	@$(BIN)/python scripts/matrix.py
 
+cluster: $(CLUSTER)/.ready ## train on two Ray nodes of this machine, that come and go
+	@$(CLUSTER)/bin/python scripts/cluster.py $(ARGS)
+
+$(CLUSTER)/.ready: pyproject.toml constraints.txt
+	@echo "Installing Ray and Roller into $(CLUSTER) (once) ..."
+	@test -x $(CLUSTER)/bin/python || $(PYTHON) -m venv $(CLUSTER)
+	@grep -v '^gymnasium==' constraints.txt > $(CLUSTER)/constraints.txt
+	@$(CLUSTER)/bin/python -m pip install --quiet --disable-pip-version-check --no-input \
+		--constraint $(CLUSTER)/constraints.txt hatchling editables
+	@$(CLUSTER)/bin/python -m pip install --quiet --disable-pip-version-check --no-input \
+		--constraint $(CLUSTER)/constraints.txt --no-build-isolation --editable '.[train,cluster]'
+	@touch $@
+
+clients: $(READY) ## let other libraries learn on Roller, each in an environment of its own
+	@$(BIN)/python scripts/clients.py $(ARGS)
+
 lint: $(READY) ## check style, types and the direction of imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	@# As on Windows, for the names that only a POSIX system has.
+	$(BIN)/mypy --platform win32 --cache-dir .mypy_cache/win32 roller_env
 	$(BIN)/lint-imports
 
 format: $(READY) ## let ruff format the code and mend what it can
@@ -80,6 +102,13 @@ docs: $(READY) ## build the documentation into site/; a dead link is an error
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "site/index.html"
 
+dist: $(READY) ## build the sdist, the wheel from the sdist, and check both
+	@rm -rf dist
+	@$(BIN)/python -m hatchling build --target sdist
+	@$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation \
+		--wheel-dir dist dist/*.tar.gz
+	@$(BIN)/python -m twine check --strict dist/*
+
 benchmark: $(READY) $(PEERS)/.ready ## measure against physics alone and other environments
 	@$(BIN)/python scripts/benchmark.py $(ARGS)
 
@@ -90,5 +119,5 @@ $(PEERS)/.ready: scripts/benchmark-peers.txt
 	@touch $@
 
 clean: ## remove the environments and caches; runs/ stays
-	rm -rf $(VENV) page/node_modules $(PEERS) $(MATRIX) build dist site .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) page/node_modules $(PEERS) $(CLUSTER) $(MATRIX) $(CLIENTS) build dist site .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -13,6 +13,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
+from roller_env.platforms import AT_ONCE
+
 LOOK_EVERY_S: Final = 0.3
 """How often to look whether a file has been saved."""
 
@@ -53,7 +55,7 @@ def read_regular_file(path: Path, most_bytes: int) -> bytes:
 
 
 def _open_at_once(path: str, flags: int) -> int:
-    return os.open(path, flags | os.O_NONBLOCK | os.O_NOCTTY)
+    return os.open(path, flags | AT_ONCE)
 
 
 def _check_kind(mode: int) -> None:

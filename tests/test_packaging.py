@@ -55,9 +55,13 @@ def run(*command: str | Path, directory: Path) -> str:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    directory = tmp_path_factory.mktemp("wheel")
+    """Return the wheel that the source distribution gives, as `make dist` builds it."""
+    directory = tmp_path_factory.mktemp("dist")
+    hatchling = (sys.executable, "-m", "hatchling", "build", "--target", "sdist")
+    run(*hatchling, "--directory", directory, directory=ROOT)
+    (sources,) = directory.glob("*.tar.gz")
     pip = (sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation")
-    run(*pip, "--wheel-dir", directory, ROOT, directory=directory)
+    run(*pip, "--wheel-dir", directory, sources, directory=directory)
     (built,) = directory.glob("*.whl")
     return built
 

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import tyro
 
 from roller_env.config import EnvConfig
+from roller_env.platforms import ENDING_SIGNALS
 from roller_env.play.offers import offers_of
 from roller_env.play.records import Records, default_file
 from roller_env.play.room import Room
@@ -118,9 +119,8 @@ def play(arguments: Arguments) -> int:
         directory = directory or RECORDED
     listening = listen(arguments.host, arguments.port)
     # When its terminal is closed, the game still writes what was recorded.
-    for name in ("SIGTERM", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.default_int_handler)
+    for number in ENDING_SIGNALS:
+        signal.signal(number, signal.default_int_handler)
     config, agent = game_of(arguments)
     keeper = ReplayKeeper(directory, "human" if agent is None else "agent and human")
     records = Records(arguments.records or default_file())
@@ -156,9 +156,8 @@ def write_record(keeper: ReplayKeeper, record: str | None) -> int:
     problems: tuple[str, ...] = ()
     if record is not None:
         # Whoever closes the terminal or shuts the machine down asks more than once.
-        for name in ("SIGTERM", "SIGHUP"):
-            if hasattr(signal, name):
-                signal.signal(getattr(signal, name), signal.SIG_IGN)
+        for number in ENDING_SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
         written = datasets.to_minari_by_level(keeper.replays, record)
         lines += [f"data set: {name}" for name in written.names]
         problems = written.problems

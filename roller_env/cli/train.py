@@ -7,6 +7,7 @@ Examples::
     roller train classic --demos demonstrations --name taught
     roller train gate --set ppo.gamma=0.995 --name far-sighted
     roller train mine.yaml
+    roller train classic --cluster 10.0.0.1:6379 --set cluster.runners=16
 """
 
 from __future__ import annotations
@@ -55,6 +56,10 @@ class Arguments:
 
     demos: str | None = None
     """Replays, or a Minari data set, that the policy learns to imitate before its first step."""
+
+    cluster: Annotated[str | None, tyro.conf.arg(metavar="ADDRESS")] = None
+    """Train by RLlib on a Ray cluster: auto, the one that this machine is part of; local, this
+    machine alone; or its head node's host:port. How: --set cluster.runners=8 and the like."""
 
     resume: bool = False
     """Go on with a run that was stopped, even by a kill; says where the results are if none was."""
@@ -117,14 +122,14 @@ def _train(arguments: Arguments) -> None:
     directory = run_directory(arguments.runs, name)
     algorithm, played = config.algorithm.upper(), shown(config.level)
     print(f"Training {algorithm} on {played}, seed {config.seed}: {shown(directory)}")
-    print_results(train(config, directory, resume=arguments.resume))
+    print_results(train(config, directory, resume=arguments.resume, cluster=arguments.cluster))
 
 
 def print_results(run: TrainingRun) -> None:
     """Say where everything is."""
     if run.was_finished:
         print(f"{shown(run.files.directory)} is finished already; remove it to train it anew.")
-        print(run.files.evaluation_table.read_text())
+        print(run.files.evaluation_table.read_text(encoding="utf-8"))
     files = run.files
     results = {
         "policy": files.policy,

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import platform
 import sys
 import threading
 from collections.abc import Iterator
@@ -171,7 +172,7 @@ def _candidates(wanted: str) -> tuple[str, ...]:
     """Return the modules of the backends to try."""
     if wanted in _BACKENDS:
         return (f"mujoco.{_BACKENDS[wanted]}",)
-    if sys.platform != "linux":
+    if platform.system() != "Linux":
         return ("mujoco.rendering.classic.gl_context",)
     displayed = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
     return ("mujoco.egl", "mujoco.glfw") if displayed else ("mujoco.egl",)

@@ -33,8 +33,8 @@ from roller_env.training.checkpoint import Progress
 from roller_env.training.files import RunFiles
 from roller_env.training.logs import STEPS, read_progress
 from roller_env.training.policy import load_policy
-from roller_env.training.ppo import has_spent_all
 from roller_env.training.run import evaluate_policy, learn_to_mastery
+from roller_env.training.schedule import has_spent_all
 
 RECIPE: Final = "recipe"
 """The variant in which nothing is changed."""

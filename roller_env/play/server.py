@@ -32,6 +32,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from roller_env.assets import asset_directory
+from roller_env.platforms import ENDING_SIGNALS
 from roller_env.play.room import Message, Room
 from roller_env.play.wire import MAX_MESSAGE_BYTES, read_message
 
@@ -320,8 +321,7 @@ async def _serve(
 @contextlib.contextmanager
 def _signals(remember: Callable[[], object]) -> Iterator[None]:
     """Let signals that end a program be told to ``remember``; the second of a kind interrupts."""
-    names = ("SIGINT", "SIGTERM", "SIGHUP")
-    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    numbers = (signal.SIGINT, *ENDING_SIGNALS)
     loop = asyncio.get_running_loop()
 
     def heard(number: int, _: object) -> None:

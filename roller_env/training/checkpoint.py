@@ -29,7 +29,6 @@ from pydantic import ValidationError
 from pydantic_core import from_json
 from safetensors import SafetensorError
 from stable_baselines3 import PPO
-from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecNormalize
 
 from roller_env.arrays import Int64
@@ -47,7 +46,10 @@ from roller_env.training.curriculum import (
 )
 from roller_env.training.exploration import Journeys
 from roller_env.training.files import RunError, read_whole, write_atomically
-from roller_env.training.normalisation import statistics
+from roller_env.training.normalisation import running_moments, set_running_moments
+
+CLUSTER: Final = "cluster"
+"""Name in a checkpoint's state under which all is that a training on a cluster left."""
 
 Tree = dict[str, Any]
 """Names to arrays, to JSON's values, or to such trees."""
@@ -125,6 +127,9 @@ class Checkpoint:
         Raises:
             CheckpointError: the checkpoint is that of another learner.
         """
+        if CLUSTER in self.state:
+            message = "of a training on a cluster; go on with --cluster"
+            raise CheckpointError(f"{shown(self.file)}: {message}")
         try:
             _set_state(model, self.state)
         except (ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
@@ -135,7 +140,7 @@ class Checkpoint:
 
 
 def save_checkpoint(file: Path, model: PPO, config: TrainingConfig, progress: Progress) -> None:
-    """Write a checkpoint; whenever the process dies, `file` is the old one or the new one.
+    """Write a checkpoint of a learner of Stable-Baselines3; see `write_checkpoint`.
 
     Args:
         file: to replace.
@@ -146,7 +151,17 @@ def save_checkpoint(file: Path, model: PPO, config: TrainingConfig, progress: Pr
     Raises:
         OSError: the disk is full or not writable; the old checkpoint is still there.
     """
-    flat = _flat(_state(model))
+    write_checkpoint(Checkpoint(file, config, progress, _state(model)))
+
+
+def write_checkpoint(checkpoint: Checkpoint) -> None:
+    """Write a checkpoint; whenever the process dies, its file is the old one or the new one.
+
+    Raises:
+        OSError: the disk is full or not writable; the old checkpoint is still there.
+    """
+    config, progress = checkpoint.config, checkpoint.progress
+    flat = _flat(checkpoint.state)
     arrays = {name: value for name, value in flat.items() if isinstance(value, np.ndarray)}
     facts = {
         "config": config.model_dump(mode="json"),
@@ -158,7 +173,8 @@ def save_checkpoint(file: Path, model: PPO, config: TrainingConfig, progress: Pr
         container.writestr(_STATE, json.dumps(facts))
         container.writestr(_ARRAYS, safetensors.numpy.save(arrays))
     body = archive.getvalue()
-    write_atomically(file, _HEADER + hashlib.sha256(body).hexdigest().encode() + b"\n" + body)
+    header = _HEADER + hashlib.sha256(body).hexdigest().encode() + b"\n"
+    write_atomically(checkpoint.file, header + body)
 
 
 def load_checkpoint(file: Path) -> Checkpoint:
@@ -234,14 +250,8 @@ def _state(model: PPO) -> Tree:
             "observations": model._last_obs,
             "episode_starts": model._last_episode_starts,
         },
-        "normaliser": {
-            "observations": {
-                name: _moments(entry) for name, entry in statistics(normaliser).items()
-            },
-            "rewards": _moments(normaliser.ret_rms),
-            "returns": normaliser.returns,
-        },
-        "environments": _of_curriculum(environments.snapshot()),
+        "normaliser": {**running_moments(normaliser), "returns": normaliser.returns},
+        "environments": curriculum_tree(environments.snapshot()),
         "random": _random_state(),
     }
 
@@ -258,17 +268,15 @@ def _set_state(model: PPO, state: Tree) -> None:
     model.policy.load_state_dict(_tensors(state["policy"]))
     optimizer = model.policy.optimizer
     moments = {int(number): _tensors(m) for number, m in state.get("optimizer", {}).items()}
-    _check_moments(moments, [p for group in optimizer.param_groups for p in group["params"]])
+    check_moments(moments, [p for group in optimizer.param_groups for p in group["params"]])
     optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
     learner = state["learner"]
     model.num_timesteps, model._n_updates = int(learner["steps"]), int(learner["updates"])
     model._last_obs = learner["observations"]
     model._last_episode_starts = learner["episode_starts"]
-    for name, entry in statistics(normaliser).items():
-        _set_moments(entry, state["normaliser"]["observations"][name])
-    _set_moments(normaliser.ret_rms, state["normaliser"]["rewards"])
+    set_running_moments(normaliser, state["normaliser"])
     normaliser.returns = state["normaliser"]["returns"]
-    environments.restore(_curriculum(state["environments"], environments.snapshot()))
+    environments.restore(curriculum_of(state["environments"], environments.snapshot()))
     # Last, because making and resetting a learner draws numbers.
     _set_random_state(state["random"])
 
@@ -281,20 +289,8 @@ def _wrappers(model: PPO) -> tuple[VecNormalize, StartStateCurriculum]:
     return normaliser, environments
 
 
-def _moments(entry: RunningMeanStd) -> Tree:
-    return {
-        "mean": np.asarray(entry.mean),
-        "variance": np.asarray(entry.var),
-        "count": float(entry.count),
-    }
-
-
-def _set_moments(entry: RunningMeanStd, moments: Tree) -> None:
-    entry.mean, entry.var = moments["mean"], moments["variance"]
-    entry.count = float(moments["count"])
-
-
-def _of_curriculum(snapshot: CurriculumSnapshot) -> Tree:
+def curriculum_tree(snapshot: CurriculumSnapshot) -> Tree:
+    """Return the tree that `curriculum_of` reads back."""
     kept_for = [task for task, games in snapshot.games.items() for _ in games]
     games = [game for games in snapshot.games.values() for game in games]
     return {
@@ -311,7 +307,7 @@ def _of_curriculum(snapshot: CurriculumSnapshot) -> Tree:
     }
 
 
-def _curriculum(tree: Tree, own: CurriculumSnapshot) -> CurriculumSnapshot:
+def curriculum_of(tree: Tree, own: CurriculumSnapshot) -> CurriculumSnapshot:
     """Return the snapshot that a tree is, of the kind that the environments' own is.
 
     Raises:
@@ -452,7 +448,7 @@ def _check_arrays(found: Tree, wanted: Tree) -> None:
             raise ValueError(f"{name}: found {has}; wanted {_kind(like)}")
 
 
-def _check_moments(
+def check_moments(
     moments: Mapping[int, dict[str, torch.Tensor]], parameters: list[torch.Tensor]
 ) -> None:
     """Refuse what Adam cannot have found for these parameters."""

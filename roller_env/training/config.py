@@ -144,6 +144,25 @@ class CloningConfig(_Frozen):
     held_out_fraction: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
 
 
+class ClusterConfig(_Frozen):
+    """How a training is spread over a cluster; no matter where it runs on one machine alone.
+
+    The samples of an update are the same as on one machine: the runners share the environments, the
+    learners the batches.
+
+    Attributes:
+        runners: processes that play, one CPU each.
+        learners: processes that learn, one CPU each; 0: the one that was started learns itself.
+        gpus_per_learner: of learners in processes of their own.
+        patience_s: a training that no runner has answered for so long ends.
+    """
+
+    runners: Annotated[WholeNumber, Field(gt=0, le=4096)] = 2
+    learners: Annotated[WholeNumber, Field(ge=0, le=256)] = 0
+    gpus_per_learner: Annotated[WholeNumber, Field(ge=0, le=16)] = 0
+    patience_s: PositiveFloat = 300.0
+
+
 class TrainingConfig(_Frozen):
     """A training, whole: with the package's version it is all that a result depends on.
 
@@ -180,6 +199,7 @@ class TrainingConfig(_Frozen):
         demonstrations: replays or a Minari data set that the policy learns from before its first
             step, as `roller_env.training.demonstrations.load_demonstrations` takes them.
         cloning: how it learns from them.
+        cluster: how it is spread over machines, if it is trained on several.
     """
 
     former_names: ClassVar = {"practice_share": "start_state_curriculum"}
@@ -205,6 +225,7 @@ class TrainingConfig(_Frozen):
     evaluation_replays: bool = False
     demonstrations: Name | None = None
     cloning: CloningConfig = CloningConfig()
+    cluster: ClusterConfig = ClusterConfig()
 
     @model_validator(mode="after")
     def _batches_fill_the_rollout(self) -> TrainingConfig:
@@ -375,6 +396,7 @@ def _problems(details: ErrorDetails, source: ConfigSource) -> list[Problem]:
         models: dict[tuple[Any, ...], type[BaseModel]] = {
             ("ppo",): PPOConfig,
             ("cloning",): CloningConfig,
+            ("cluster",): ClusterConfig,
         }
         known = tuple(models.get(path[:-1], TrainingConfig).model_fields)
         return [_unknown(path, known, source)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -10,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from roller_env.platforms import flush_directory, lock
 from roller_env.problems import quoted, shown
 
 MAX_NAME_BYTES: Final = 150
@@ -151,11 +151,7 @@ def write_atomically(file: Path, content: bytes | str) -> None:
             os.fsync(stream.fileno())
         temporary.replace(file)
         # The new name is in the directory, which reaches the disk in its own time unless told.
-        descriptor = os.open(file.parent, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        flush_directory(file.parent)
     except OSError as error:
         with suppress(OSError):
             temporary.unlink(missing_ok=True)
@@ -190,9 +186,9 @@ def only_one_process(directory: Path) -> Iterator[None]:
         RunError: another process is training this run.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    with (directory / ".lock").open("a") as lock:
+    with (directory / ".lock").open("a", encoding="utf-8") as held:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(held)
         except BlockingIOError as error:
             message = (
                 f"{shown(directory)} is being trained by another process; choose another --name"

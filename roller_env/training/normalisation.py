@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from stable_baselines3.common.running_mean_std import RunningMeanStd
@@ -61,3 +63,56 @@ def statistics(normaliser: VecNormalize) -> dict[str, RunningMeanStd]:
         return {}
     found = normaliser.obs_rms
     return dict(found) if isinstance(found, dict) else {WHOLE: found}
+
+
+Moments = Mapping[str, Any]
+"""``mean`` and ``variance``, float64 arrays of one shape, and ``count``, of what was seen."""
+
+
+def running_moments(normaliser: VecNormalize) -> dict[str, Any]:
+    """Return a wrapper's `Moments`: ``observations``, a mapping by name, and ``rewards``."""
+    seen = {name: _moments(entry) for name, entry in statistics(normaliser).items()}
+    return {"observations": seen, "rewards": _moments(normaliser.ret_rms)}
+
+
+def set_running_moments(normaliser: VecNormalize, moments: Mapping[str, Any]) -> None:
+    """Give a wrapper what `running_moments` returned."""
+    for name, entry in statistics(normaliser).items():
+        _set(entry, moments["observations"][name])
+    _set(normaliser.ret_rms, moments["rewards"])
+
+
+def merged(base: Moments, others: Sequence[Moments]) -> Moments:
+    """Return the moments of what went on from one base in several places.
+
+    Each of ``others`` has seen all of the base and something more. What more is found by taking
+    the base out again (Chan, Golub & LeVeque 1979), and put to the base.
+
+    Args:
+        base: where all began.
+        others: where each has come to.
+    """
+    whole = RunningMeanStd(shape=np.shape(base["mean"]))
+    _set(whole, base)
+    for other in others:
+        count = other["count"] - base["count"]
+        if count <= 0.0:
+            continue
+        mean = (other["count"] * other["mean"] - base["count"] * base["mean"]) / count
+        between = (mean - base["mean"]) ** 2 * base["count"] * count / other["count"]
+        squares = other["count"] * other["variance"] - base["count"] * base["variance"] - between
+        whole.update_from_moments(mean, np.maximum(squares / count, 0.0), count)
+    return _moments(whole)
+
+
+def _moments(entry: RunningMeanStd) -> Moments:
+    return {
+        "mean": np.asarray(entry.mean),
+        "variance": np.asarray(entry.var),
+        "count": float(entry.count),
+    }
+
+
+def _set(entry: RunningMeanStd, moments: Moments) -> None:
+    entry.mean, entry.var = moments["mean"], moments["variance"]
+    entry.count = float(moments["count"])

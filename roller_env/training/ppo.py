@@ -3,31 +3,28 @@
 from __future__ import annotations
 
 import sys
-import time
-from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.logger import Logger
-from stable_baselines3.common.utils import ConstantSchedule, LinearSchedule
+from stable_baselines3.common.utils import ConstantSchedule
 from stable_baselines3.common.vec_env import VecNormalize
 
-from roller_env.envs.infos import TERMS
 from roller_env.envs.sb3 import RollerVecEnv
-from roller_env.game.result import REWARD_TERMS
 from roller_env.training.checkpoint import Progress, load_checkpoint, save_checkpoint
 from roller_env.training.config import TrainingConfig
-from roller_env.training.curriculum import FROM_START, StartStateCurriculum
-from roller_env.training.display import ProgressDisplay
+from roller_env.training.curriculum import StartStateCurriculum
 from roller_env.training.files import RunFiles
-from roller_env.training.logs import STEPS, ContinuingCSV, ContinuingTensorBoard
 from roller_env.training.network import network_class, network_options
-
-_MEMORY: Final = 0.01
-"""Share that an episode has of the running mean of mastery."""
+from roller_env.training.recording import Recording, new_logger
+from roller_env.training.schedule import (
+    entropy_coefficient,
+    finality,
+    is_complete,
+    learning_rate,
+)
 
 _ROWS_PER_EXPLORER: Final = 4
 """Environments that are learnt from for each that only explores."""
@@ -56,11 +53,7 @@ def learn(config: TrainingConfig, files: RunFiles) -> tuple[PPO, Progress]:
         progress = checkpoint.progress
     if is_complete(config, progress):
         return model, progress
-    outputs = [
-        ContinuingCSV(files.progress, progress.steps),
-        ContinuingTensorBoard(files.tensorboard, progress.steps),
-    ]
-    model.set_logger(Logger(str(files.directory), outputs))
+    model.set_logger(new_logger(files, progress))
     recorder = _Recorder(config, files, progress)
     try:
         model.learn(
@@ -73,41 +66,9 @@ def learn(config: TrainingConfig, files: RunFiles) -> tuple[PPO, Progress]:
     except _BudgetSpent:
         pass
     finally:
-        recorder.display.close()
+        recorder.recording.close()
         model.logger.close()
-    return model, recorder.progress
-
-
-def is_complete(config: TrainingConfig, progress: Progress) -> bool:
-    """Return whether a training wants no more steps."""
-    return progress.steps >= last_step(config, progress) or has_spent_all(config, progress)
-
-
-def has_spent_all(config: TrainingConfig, progress: Progress) -> bool:
-    """Return whether a training may not go on, whatever it has reached."""
-    budget_s = config.wall_clock_budget_s
-    out_of_time = budget_s is not None and progress.wall_s >= budget_s
-    return progress.steps >= config.total_steps or out_of_time
-
-
-def last_step(config: TrainingConfig, progress: Progress) -> int:
-    """Return after how many steps a training ends, as far as that is known."""
-    if progress.final_from is None:
-        return config.total_steps
-    return min(progress.final_from + config.final_steps, config.total_steps)
-
-
-def finality(config: TrainingConfig, progress: Progress) -> float:
-    """Return how far the last values of what changes are reached, 0 to 1.
-
-    Without a mastery to reach they are so evenly from the first step to the last.
-    """
-    if config.mastery is None:
-        return progress.steps / config.total_steps
-    begins, length = progress.final_from, min(config.final_steps, config.total_steps)
-    if begins is None:
-        begins = config.total_steps - length
-    return min(max((progress.steps - begins) / length, 0.0), 1.0)
+    return model, recorder.recording.progress
 
 
 def make_environments(config: TrainingConfig) -> StartStateCurriculum:
@@ -120,25 +81,23 @@ def make_environments(config: TrainingConfig) -> StartStateCurriculum:
     return StartStateCurriculum(environments, fraction, config.seed, explorers)
 
 
-def _learning_rate(config: TrainingConfig) -> LinearSchedule:
-    """Return the learning rate by how much is left of what changes it, 1 to 0."""
-    end = 0.0 if config.ppo.learning_rate_decay == "linear" else config.ppo.learning_rate
-    return LinearSchedule(config.ppo.learning_rate, end, end_fraction=1.0)
-
-
-def new_model(config: TrainingConfig, environments: StartStateCurriculum) -> PPO:
-    """Return a learner that knows nothing yet."""
-    normaliser = VecNormalize(
+def new_normaliser(config: TrainingConfig, environments: StartStateCurriculum) -> VecNormalize:
+    """Return environments with observations and rewards scaled as the configuration says."""
+    return VecNormalize(
         environments,
         norm_obs=config.normalise_observations,
         norm_reward=config.normalise_rewards,
         gamma=config.ppo.gamma,
     )
+
+
+def new_model(config: TrainingConfig, environments: StartStateCurriculum) -> PPO:
+    """Return a learner that knows nothing yet."""
     ppo = config.ppo
     return PPO(
         network_class(config),
-        normaliser,
-        learning_rate=_learning_rate(config),
+        new_normaliser(config, environments),
+        learning_rate=learning_rate(config),
         n_steps=ppo.rollout_steps,
         batch_size=ppo.batch_size,
         n_epochs=ppo.epochs,
@@ -159,118 +118,42 @@ class _BudgetSpent(Exception):
     """Leaves SB3's loop between two updates, which a callback's False cannot."""
 
 
-@dataclass(slots=True)
-class _Episodes:
-    """The whole episodes, from the level's start, that ended during one rollout."""
-
-    infos: list[dict[str, Any]] = field(default_factory=list)
-
-    def statistics(self) -> dict[str, float]:
-        """Return means; NaN where no episode ended."""
-        return {
-            "rollout/episodes": len(self.infos),
-            "rollout/ep_rew_mean": self._mean([info["episode"]["r"] for info in self.infos]),
-            "rollout/ep_len_mean": self._mean([info["episode"]["l"] for info in self.infos]),
-            "rollout/success_rate": self._mean([info["success"] for info in self.infos]),
-            "rollout/score_percent": self._mean([info["score_percent"] for info in self.infos]),
-            "rollout/coins": self._mean([info["coins"] for info in self.infos]),
-            "rollout/fall_rate": self._mean([info["fall"] for info in self.infos]),
-            "rollout/diverged": sum(info["diverged"] for info in self.infos),
-            **{
-                f"reward/{term}": self._mean([info[TERMS][term] for info in self.infos])
-                for term in REWARD_TERMS
-            },
-        }
-
-    def mastery(self, before: float) -> float:
-        """Return the running mean of `Progress.mastery` after these episodes."""
-        for info in self.infos:
-            achieved = info["success"] * info["score_percent"] / 100.0
-            before += _MEMORY * (achieved - before)
-        return before
-
-    @staticmethod
-    def _mean(values: list[float]) -> float:
-        return float(np.mean(values)) if values else float("nan")
-
-
 class _Recorder(BaseCallback):
     """Between two updates: a row in the logs, the display, and a checkpoint when one is due."""
 
     def __init__(self, config: TrainingConfig, files: RunFiles, progress: Progress) -> None:
         super().__init__()
-        self.progress = progress
-        self.display = ProgressDisplay(config.total_steps, progress.steps)
+        self.recording = Recording(config, progress)
         self._config = config
         self._files = files
-        self._wall_s_before = progress.wall_s
-        self._start_s = self._checkpoint_s = time.monotonic()
-        self._episodes = _Episodes()
 
     def _on_step(self) -> bool:
         ended = (self.locals["infos"][row] for row in np.flatnonzero(self.locals["dones"]))
-        self._episodes.infos += [info for info in ended if info[FROM_START]]
+        self.recording.add(ended)
         return True
 
     def _on_rollout_start(self) -> None:
         # SB3 has no event for the end of an update; the next rollout's start is the same moment.
         self._between_updates()
-        if is_complete(self._config, self.progress):
+        progress = self.recording.progress
+        if is_complete(self._config, progress):
             raise _BudgetSpent
         assert isinstance(self.model, PPO)
-        begin, end = (
-            self._config.ppo.entropy_coefficient,
-            self._config.ppo.final_entropy_coefficient,
-        )
         if self._config.mastery is not None:
-            begin *= 1.0 - self.progress.mastery
             # SB3 knows how far a training is only of those that end at a known step.
-            left = 1.0 - finality(self._config, self.progress)
-            self.model.lr_schedule = ConstantSchedule(_learning_rate(self._config)(left))
-        if end is not None:
-            done = finality(self._config, self.progress)
-            self.model.ent_coef = begin + (end - begin) * done
+            left = 1.0 - finality(self._config, progress)
+            self.model.lr_schedule = ConstantSchedule(learning_rate(self._config)(left))
+        self.model.ent_coef = entropy_coefficient(self._config, progress)
 
     def _on_training_end(self) -> None:
         self._between_updates()
 
     def _between_updates(self) -> None:
-        steps = self.model.num_timesteps
-        if steps == self.progress.steps:
+        if self.model.num_timesteps == self.recording.progress.steps:
             return
-        before = self.progress
-        wall_s = self._wall_s_before + time.monotonic() - self._start_s
-        mastery = self._episodes.mastery(before.mastery)
-        final_from = before.final_from
-        if final_from is None and self._config.mastery and mastery >= self._config.mastery:
-            final_from = steps
-        self.progress = Progress(steps, wall_s, mastery, final_from)
-        speed = (steps - before.steps) / max(wall_s - before.wall_s, 1e-9)
-        statistics = self._episodes.statistics()
-        self._episodes = _Episodes()
-        for key, value in statistics.items():
-            self.logger.record(key, value)
-        self.logger.record(STEPS, steps, exclude="tensorboard")
-        self.logger.record("time/fps", round(speed))
-        self.logger.record("time/wall_s", round(wall_s, 3), exclude="tensorboard")
-        self.logger.dump(steps)
-        self.display.update(steps, last_step(self._config, self.progress), _achieved(statistics))
-        self._checkpoint_if_due()
-
-    def _checkpoint_if_due(self) -> None:
-        age_s = time.monotonic() - self._checkpoint_s
-        if age_s >= self._config.checkpoint_interval_s or is_complete(self._config, self.progress):
+        self.recording.update(self.model.num_timesteps, self.logger)
+        if self.recording.checkpoint_is_due():
             assert isinstance(self.model, PPO)
-            save_checkpoint(self._files.checkpoint, self.model, self._config, self.progress)
-            self._checkpoint_s = time.monotonic()
-
-
-def _achieved(statistics: dict[str, float]) -> str:
-    if not statistics["rollout/episodes"]:
-        return "no episode ended yet"
-    terms = ", ".join(f"{term} {statistics[f'reward/{term}']:.0f}" for term in REWARD_TERMS)
-    return (
-        f"finish {statistics['rollout/success_rate']:.0%}, "
-        f"coins {statistics['rollout/coins']:.1f}, falls {statistics['rollout/fall_rate']:.0%}; "
-        f"reward {statistics['rollout/ep_rew_mean']:.0f} ({terms})"
-    )
+            progress = self.recording.progress
+            save_checkpoint(self._files.checkpoint, self.model, self._config, progress)
+            self.recording.checkpoint_written()

@@ -14,6 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 from pydantic_core import from_json
+from stable_baselines3 import PPO
 
 from roller_env import __version__
 from roller_env.divergence import reports_in
@@ -25,8 +26,9 @@ from roller_env.training.checkpoint import (
     CheckpointError,
     Progress,
     load_checkpoint,
-    save_checkpoint,
+    write_checkpoint,
 )
+from roller_env.training.cluster import check_cluster
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.demonstrations import Demonstration, load_demonstrations
 from roller_env.training.evaluate import Evaluation, check_recordable, envs_and_repeats, evaluate
@@ -39,13 +41,14 @@ from roller_env.training.files import (
 )
 from roller_env.training.pictures import draw_paths, film_episode
 from roller_env.training.policy import Policy, load_policy, save_policy
-from roller_env.training.ppo import has_spent_all, learn
+from roller_env.training.ppo import learn
 from roller_env.training.report import (
     advice,
     draw_learning_curve,
     markdown_table,
     write_evaluation,
 )
+from roller_env.training.schedule import has_spent_all
 
 EVALUATION_SEED_OFFSET: Final = 1_000_000
 """Added to a training's seed, so that an agent is judged on starts it was not trained on."""
@@ -75,7 +78,9 @@ class TrainingRun:
     was_finished: bool
 
 
-def train(config: TrainingConfig, directory: Path, *, resume: bool = False) -> TrainingRun:
+def train(
+    config: TrainingConfig, directory: Path, *, resume: bool = False, cluster: str | None = None
+) -> TrainingRun:
     """Train, evaluate and draw; every file of `RunFiles` is there afterwards.
 
     The video is left out, and said to be, where no OpenGL library is found.
@@ -84,10 +89,14 @@ def train(config: TrainingConfig, directory: Path, *, resume: bool = False) -> T
         config: of the training.
         directory: of the run; made if it does not exist.
         resume: go on with what is there, if anything is.
+        cluster: address of the Ray cluster that RLlib trains on: ``auto``, the one that this
+            machine is part of; ``local``, this machine alone; or the head node's ``host:port``.
+            None: Stable-Baselines3 trains, in this process. What is left is the same.
 
     Raises:
         RunError: the directory holds another run, one that was not to be resumed, or one that
-            another process is training; or the disk is full or cannot be written to.
+            another process is training; or the disk is full or cannot be written to; or the
+            cluster cannot be used.
         CheckpointError: the checkpoint is damaged.
         DemonstrationError: the demonstrations cannot be used.
         LevelError: the level cannot be used.
@@ -95,13 +104,15 @@ def train(config: TrainingConfig, directory: Path, *, resume: bool = False) -> T
     files = RunFiles(directory)
     # All that can be wrong with what is asked for shows now, before there is a directory for it.
     demonstrations = None
+    if cluster is not None:
+        check_cluster(config, cluster)
     if not (files.checkpoint.exists() or files.summary.exists()):
         check_playable(config)
         if config.demonstrations is not None:
             demonstrations = load_demonstrations(config.demonstrations, config)
     try:
         with only_one_process(directory), reports_in(directory):
-            return _train(config, files, demonstrations, resume)
+            return _train(config, files, demonstrations, resume, cluster)
     except OSError as error:
         raise RunError(_unwritable(error, files)) from error
     except MemoryError as error:
@@ -129,13 +140,14 @@ def _train(
     files: RunFiles,
     demonstrations: Sequence[Demonstration] | None,
     resume: bool,
+    cluster: str | None,
 ) -> TrainingRun:
     _claim(config, files, resume)
     if files.summary.exists():
         return TrainingRun(files, _read_summary(files.summary), was_finished=True)
     if demonstrations is not None:
         print(start_from_demonstrations(config, demonstrations, files), flush=True)
-    progress = learn_to_mastery(config, files)
+    progress = learn_to_mastery(config, files, cluster)
     start_s = time.monotonic()
     policy = load_policy(files.directory)
     player = player_of(files.directory)
@@ -152,7 +164,9 @@ def _train(
     return TrainingRun(files, summary, was_finished=False)
 
 
-def learn_to_mastery(config: TrainingConfig, files: RunFiles) -> Progress:
+def learn_to_mastery(
+    config: TrainingConfig, files: RunFiles, cluster: str | None = None
+) -> Progress:
     """Train until the level is mastered by the likeliest actions, too, and keep the policy.
 
     While it learns the agent draws its actions, and may finish all of its games by chance where the
@@ -162,9 +176,10 @@ def learn_to_mastery(config: TrainingConfig, files: RunFiles) -> Progress:
     Args:
         config: of the training. Without ``mastery`` it just ends after its steps.
         files: where checkpoint and logs are or go.
+        cluster: address of the one that trains, if any.
     """
     while True:
-        model, progress = learn(config, files)
+        model, progress = _learn(config, files, cluster)
         save_policy(model, config, files)
         if config.mastery is None or has_spent_all(config, progress):
             return progress
@@ -175,7 +190,16 @@ def learn_to_mastery(config: TrainingConfig, files: RunFiles) -> Progress:
             return progress
         print(f"by its likeliest actions {mastery:.0%} are mastered: it goes on", flush=True)
         again = replace(progress, mastery=0.0, final_from=None)
-        save_checkpoint(files.checkpoint, model, config, again)
+        write_checkpoint(replace(load_checkpoint(files.checkpoint), progress=again))
+
+
+def _learn(config: TrainingConfig, files: RunFiles, cluster: str | None) -> tuple[PPO, Progress]:
+    if cluster is None:
+        return learn(config, files)
+    # Ray need not be installed where no cluster is asked for.
+    from roller_env.training import rllib
+
+    return rllib.learn(config, files, cluster)
 
 
 def evaluate_policy(
@@ -217,7 +241,9 @@ def _claim(config: TrainingConfig, files: RunFiles, resume: bool) -> None:
     name = shown(files.directory)
     if not resume:
         raise RunError(f"{name} exists; --resume goes on with it, --name starts another")
-    differences = load_config(files.config).differences(config)
+    begun = load_config(files.config)
+    # Over how many processes it is spread is no part of what a run is.
+    differences = begun.model_copy(update={"cluster": config.cluster}).differences(config)
     if differences:
         raise RunError(
             f"{name} was started with another configuration (its value, yours):\n"

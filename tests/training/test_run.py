@@ -21,15 +21,17 @@ import torch
 
 from roller_env.drawing.opengl import missing_opengl
 from roller_env.level import LevelError, load_level
-from roller_env.training import ppo, run
+from roller_env.training import run
 from roller_env.training.checkpoint import Progress
 from roller_env.training.config import TrainingConfig, load_config
 from roller_env.training.demonstrations import DemonstrationError
 from roller_env.training.files import RunError, RunFiles, run_directory
 from roller_env.training.logs import STEPS, read_progress
 from roller_env.training.policy import TrainedPolicy, load_policy
-from roller_env.training.ppo import finality, last_step, learn, make_environments, new_model
+from roller_env.training.ppo import learn, make_environments, new_model
+from roller_env.training.recording import Episodes
 from roller_env.training.run import evaluate_policy, learn_to_mastery, train
+from roller_env.training.schedule import finality, last_step
 from tests.patience import STALLED_S
 from tests.training.disk import largest_file
 from tests.training.small import UPDATES, small_config
@@ -353,7 +355,7 @@ def test_a_training_ends_when_the_likeliest_actions_have_mastered_the_level(
         return SimpleNamespace(results=[result])
 
     # As if whoever learns did well from the second update on.
-    monkeypatch.setattr(ppo._Episodes, "mastery", lambda _, before: before + 0.25)
+    monkeypatch.setattr(Episodes, "mastery", lambda _, before: before + 0.25)
     monkeypatch.setattr(run, "evaluate_policy", played)
     progress = learn_to_mastery(config, RunFiles(tmp_path))
     assert progress.steps == steps
@@ -392,7 +394,7 @@ def test_rates_stay_until_the_end_and_go_to_their_last_values_there() -> None:
 def test_a_training_to_mastery_goes_on_with_the_same_bits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ppo._Episodes, "mastery", lambda _, before: before + 0.25)
+    monkeypatch.setattr(Episodes, "mastery", lambda _, before: before + 0.25)
     changes = {"mastery": 0.5, "final_steps": 3 * UPDATE}
     whole, _ = learn(small_config(**changes), RunFiles(tmp_path / "whole"))
     files = RunFiles(tmp_path / "parts")
