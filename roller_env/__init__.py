@@ -27,11 +27,17 @@ for _id, _options in ENV_IDS.items():
         kwargs=_options,
     )
 
-GENERATED_ID: Final = "Roller/Generated-v0"
-"""Games on generated levels, another one in every episode."""
+GENERATED_IDS: Final[dict[str, dict[str, Any]]] = {
+    "Roller/Generated-v0": {"version": 1, "num_levels": 500},
+    "Roller/Generated-v1": {"version": 2, "num_levels": 200, "kinds": "all"},
+}
+"""Games on generated levels, another one in every episode, by the version of the generator: an id's
+levels never change. All of the second's levels are seen alike, whichever pieces a range has."""
 
-gym.register(
-    GENERATED_ID,
-    entry_point="roller_env.envs.generated:GeneratedEnv",
-    vector_entry_point="roller_env.envs.generated:GeneratedVectorEnv",
-)
+for _id, _options in GENERATED_IDS.items():
+    gym.register(
+        _id,
+        entry_point="roller_env.envs.generated:GeneratedEnv",
+        vector_entry_point="roller_env.envs.generated:GeneratedVectorEnv",
+        kwargs=_options,
+    )

@@ -37,6 +37,7 @@ from roller_env.level import (
     parse_level,
 )
 from roller_env.level.expand import expand
+from roller_env.level.generate import LATEST
 from roller_env.level.maps import export_map, read_map
 from roller_env.level.template import new_level
 from roller_env.level.text import fields_text, level_text
@@ -288,21 +289,26 @@ def solve(
 
 
 def generate(
-    seed: int = 0, difficulty: float = 0.5, output: Output = None, view: View = "overview"
+    seed: int = 0,
+    difficulty: float = 0.5,
+    output: Output = None,
+    view: View = "overview",
+    version: int = LATEST,
 ) -> int:
     """Write a level that the generator makes and the solver has won, and a picture of it.
 
     Args:
-        seed: which level; the same seed and difficulty give the same one for ever.
+        seed: which level; the same seed, difficulty and version give the same one for ever.
         difficulty: 0 to 1.
         output: level file to write; by default the level's name and .yaml, in this directory.
         view: of the picture, which lies beside it: plan needs no OpenGL, overview does.
+        version: of the generator, 1 or 2.
     """
     # Imported here: the other commands play nothing.
     from roller_env.solver import won_level
 
     try:
-        won = won_level(seed, difficulty)
+        won = won_level(seed, difficulty, version=version)
     except (RuntimeError, ValueError) as error:
         raise CommandError(str(error)) from None
     file = output or Path(f"{won.level.name}.yaml")

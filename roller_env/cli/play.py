@@ -22,15 +22,15 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import tyro
 
-from roller_env.assets import SHIPPED
+from roller_env.assets import LEVELS, SHIPPED
 from roller_env.config import EnvConfig
 from roller_env.platforms import ENDING_SIGNALS
-from roller_env.play.offers import offers_of
+from roller_env.play.offers import OWN, offers_of
 from roller_env.play.records import Records, default_file
-from roller_env.play.room import Room
+from roller_env.play.room import Offer, Room
 from roller_env.play.server import DEFAULT_PORT, LOOPBACK, listen, serve, warning_of
 from roller_env.play.session import GameSession, Observer, play_config
-from roller_env.problems import printable
+from roller_env.problems import listed, printable
 from roller_env.replay import datasets
 from roller_env.replay.keeper import ReplayKeeper
 
@@ -125,18 +125,25 @@ def play(arguments: Arguments) -> int:
     for number in ENDING_SIGNALS:
         signal.signal(number, signal.default_int_handler)
     config, agent = game_of(arguments)
-    keeper = ReplayKeeper(directory, "human" if agent is None else "agent and human")
+    player = "human" if agent is None else "agent and human"
+    keeper = ReplayKeeper(directory, player, keeps_all=arguments.record is not None)
     records = Records(arguments.records or default_file())
     crowd = crowd_of(agent, arguments)
-    offers = offers_of(config.level)
+    chosen = str(config.level) if config.level in LEVELS else OWN
     shipped = those_shipped(agent, crowd, arguments)
+    offers = offers_of(config.level)
     for each in (agent, crowd):
         if each is not None and each not in shipped:
             offers = [offer for offer in offers if each.policy.plays(offer.level)]
+    if all(offer.name != chosen for offer in offers):
+        raise ValueError(
+            f"level: found {config.level}, which shows what the agent has not learnt to see; it "
+            f"plays {listed([offer.name for offer in offers])}"
+        )
     room = Room(
-        game_opener(config, agent, arguments, shipped),
+        game_opener(config, agent, arguments, offers, shipped),
         offers,
-        str(config.level),
+        chosen,
         keeper=keeper,
         records=records,
         agent=agent,
@@ -220,18 +227,20 @@ def game_opener(
     config: EnvConfig,
     agent: Autopilot | None,
     arguments: Arguments,
+    offers: Sequence[Offer],
     shipped: Sequence[Autopilot | Crowd] = (),
 ) -> Callable[[str, Sequence[Observer]], GameSession]:
-    """Return what makes the game of a level, and lets its own agents play if they are shipped."""
+    """Return what makes the game of an offer, and lets the level's own agents play if shipped."""
+    levels = {offer.name: offer.level for offer in offers}
 
-    def open_game(level: str, observers: Sequence[Observer]) -> GameSession:
+    def open_game(name: str, observers: Sequence[Observer]) -> GameSession:
         for each in shipped:
             from roller_env.training.policy import load_policy
             from roller_env.training.shipped import run_of
 
-            each.policy = load_policy(run_of(SHIPPED, level))
+            each.policy = load_policy(run_of(SHIPPED, name))
         return GameSession(
-            replace(config, level=level),
+            replace(config, level=levels[name]),
             skip_intro=arguments.skip_intro,
             seed=arguments.seed,
             agent=agent,

@@ -11,16 +11,18 @@ from typing import Any, Final
 
 from roller_env.envs.single import RollerEnv
 from roller_env.envs.vector import RollerVectorEnv
+from roller_env.level.generate import LATEST
 from roller_env.level.proved import proved_levels
 
-NUM_LEVELS: Final = 500
+NUM_LEVELS: Final = 200
 DIFFICULTY: Final = 0.25
 
 
 class GeneratedEnv(RollerEnv):
-    """A game on generated levels, each proved winnable: ``Roller/Generated-v0``.
+    """A game on generated levels, each proved winnable: ``Roller/Generated-v1``.
 
     Version history:
+        v1: levels of version 2 of the generator, which has every kind of piece; ``kinds="all"``.
         v0: the first version.
     """
 
@@ -30,6 +32,7 @@ class GeneratedEnv(RollerEnv):
         num_levels: int = NUM_LEVELS,
         start_level: int = 0,
         difficulty: float = DIFFICULTY,
+        version: int = LATEST,
         physics: Any = "rigid",
         **options: Any,
     ):
@@ -38,7 +41,9 @@ class GeneratedEnv(RollerEnv):
         Args:
             num_levels: how many levels there are; every reset draws one.
             start_level: seed of the first.
-            difficulty: 0 to 1.
+            difficulty: one of those that there are proved levels of; the message of an error says
+                which.
+            version: of the generator; ``Roller/Generated-v0`` has the first.
             physics: ``rigid`` or ``relaxed``, unless there is one level only.
             options: the others of `roller_env.config.EnvConfig`, but for ``level``.
 
@@ -46,7 +51,7 @@ class GeneratedEnv(RollerEnv):
             TypeError: there is no option of that name.
             ValueError: an option's value is not allowed, or nobody has proved such a level.
         """
-        levels = proved_levels(num_levels, start_level, difficulty)
+        levels = proved_levels(num_levels, start_level, difficulty, version=version)
         super().__init__(levels=levels, physics=physics, **options)
 
 
@@ -64,6 +69,7 @@ class GeneratedVectorEnv(RollerVectorEnv):
         num_levels: int = NUM_LEVELS,
         start_level: int = 0,
         difficulty: float = DIFFICULTY,
+        version: int = LATEST,
         physics: Any = "rigid",
         **options: Any,
     ):
@@ -73,5 +79,5 @@ class GeneratedVectorEnv(RollerVectorEnv):
             TypeError: there is no option of that name.
             ValueError: an option's value is not allowed, or nobody has proved such a level.
         """
-        levels = proved_levels(num_levels, start_level, difficulty)
+        levels = proved_levels(num_levels, start_level, difficulty, version=version)
         super().__init__(num_envs, levels=levels, physics=physics, **options)

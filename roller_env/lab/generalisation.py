@@ -50,7 +50,7 @@ OPTIONS: Final[dict[str, Any]] = {
 
 def levels_from(seed: int, count: int) -> list[Level]:
     """Return generated levels with the seeds from one on."""
-    return [generate(seed + number, DIFFICULTY) for number in range(count)]
+    return [generate(seed + number, DIFFICULTY, version=1) for number in range(count)]
 
 
 def row(count: int, seed: int, steps: int) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from typing import Final
 
 from roller_env.assets import asset_directory
 from roller_env.checks import number, whole
-from roller_env.level.generate import VERSION, generate
+from roller_env.level.generate import LATEST, VERSIONS, generate
 from roller_env.level.schema import Level
 
 Verdicts = dict[float, dict[int, int]]
@@ -24,21 +24,25 @@ Verdicts = dict[float, dict[int, int]]
 MOST_LEVELS: Final = 100_000
 
 
-def proved_levels(count: int, first_seed: int = 0, difficulty: float = 0.25) -> list[Level]:
+def proved_levels(
+    count: int, first_seed: int = 0, difficulty: float = 0.25, *, version: int = LATEST
+) -> list[Level]:
     """Return generated levels, each of which the solver has won.
 
     Args:
         count: how many.
         first_seed: seed of the first; the others follow.
         difficulty: one of those in the table.
+        version: of the generator.
 
     Raises:
         ValueError: a seed is not in the table; the message says which are.
     """
+    version = whole("version", version, min(VERSIONS), LATEST)
     whole("num_levels", count, 1, MOST_LEVELS)
     whole("start_level", first_seed, 0, 2**63 - 1)
     number("difficulty", difficulty, 0.0, 1.0, "a number from 0 to 1")
-    table = verdicts()
+    table = verdicts(version)
     known = table.get(float(difficulty), {})
     seeds = range(first_seed, first_seed + count)
     missing = [seed for seed in seeds if seed not in known]
@@ -48,21 +52,21 @@ def proved_levels(count: int, first_seed: int = 0, difficulty: float = 0.25) -> 
         )
         raise ValueError(
             f"start_level, num_levels, difficulty: found seed {missing[0]} at difficulty "
-            f"{difficulty:g}, which nobody has proved winnable; there are {there} "
-            "(roller_env.solver.won_level proves others)"
+            f"{difficulty:g}, which nobody has proved winnable; of version {version} there are "
+            f"{there} (roller_env.solver.won_level proves others)"
         )
-    return [generate(seed, difficulty, known[seed]) for seed in seeds]
+    return [generate(seed, difficulty, known[seed], version=version) for seed in seeds]
 
 
 @cache
-def verdicts() -> Verdicts:
-    """Return the table."""
-    return read_verdicts(verdicts_file())
+def verdicts(version: int = LATEST) -> Verdicts:
+    """Return the table of a version of the generator."""
+    return read_verdicts(verdicts_file(version))
 
 
-def verdicts_file() -> Path:
-    """Return the table's file, of this version of the generator."""
-    return asset_directory("generated") / f"proved-v{VERSION}.csv"
+def verdicts_file(version: int = LATEST) -> Path:
+    """Return the file of that table."""
+    return asset_directory("generated") / f"proved-v{version}.csv"
 
 
 def read_verdicts(file: Path) -> Verdicts:

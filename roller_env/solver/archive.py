@@ -16,6 +16,7 @@ from roller_env.arrays import Float64, Int64
 from roller_env.pieces.coin import COIN
 from roller_env.pieces.platform import PLATFORM
 from roller_env.simulation import Simulation, Snapshot
+from roller_env.solver.platforms import Platforms
 
 CELL_M: Final = 1.0
 """Edge of a cell."""
@@ -164,16 +165,10 @@ def _platforms(simulation: Simulation) -> Int64:
 
     Who comes somewhere first may have to wait there: the same place is another cell then.
     """
-    table, movers = simulation.table.of(PLATFORM), simulation.table.movers
-    own = simulation.table.own(PLATFORM)
-    if not own.movers:
+    platforms = Platforms.of(simulation)
+    if not len(platforms):
         return np.zeros((simulation.num_envs, 0), dtype=np.int64)
-    mine = slice(own.mover, own.mover + own.movers)
-    start, along = movers.centre[0, mine], movers.along[0, mine]
-    from_start = simulation.ball_position[:, None] - start
-    nearest = np.clip((from_start * along).sum(axis=2), movers.stop[0, mine], 0.0)
-    apart = np.linalg.norm(from_start - nearest[..., None] * along, axis=2)
-    which = apart.argmin(axis=1)
+    table, which = simulation.table.of(PLATFORM), platforms.nearest(simulation)
     period_s = 2.0 * (table.way[0] / table.speed[0] + table.wait_s[0])[which]
     clock_s = simulation.state.of(PLATFORM).clock_s[np.arange(len(which)), which]
     return np.stack([which, (clock_s % period_s / PHASE_S).astype(np.int64)], axis=1)

@@ -13,16 +13,16 @@ from roller_env.config import EnvConfig, make_config
 from roller_env.game.actions import DIRECTIONS, forces
 from roller_env.level import Level
 from roller_env.level.expand import expand
-from roller_env.level.generate import generate
+from roller_env.level.generate import LATEST, generate
 from roller_env.pieces.coin import COIN, COIN_REACH_M
 from roller_env.pieces.finish import FINISH
 from roller_env.pieces.hazard import HAZARD
-from roller_env.pieces.platform import PLATFORM
 from roller_env.replay.contents import Replay
 from roller_env.replay.recorder import Recorder
 from roller_env.replay.scripted import steering
 from roller_env.simulation import Simulation, joined
 from roller_env.solver.archive import ROOT, Archive, Node, cells
+from roller_env.solver.platforms import Platforms
 
 SOLVER: Final = "solver"
 """Who played, in a replay's words."""
@@ -142,7 +142,7 @@ class Search:
         wanted = table.regions.real[0].copy()
         wanted[own.region : own.region + own.regions] = False
         regions = table.regions.centre[0][wanted]
-        platforms = self._platforms()
+        platforms = Platforms.of(simulation).places(simulation)
         coins, taken = table.of(COIN).at[0], simulation.state.of(COIN).taken
         aims = np.full((GAMES, 3), np.nan)
         for row in np.flatnonzero(rng.random(GAMES) < _HEADS):
@@ -155,15 +155,6 @@ class Search:
                 places.append(platforms[row, rng.integers(platforms.shape[1])])
             aims[row] = places[rng.integers(len(places))]
         return aims
-
-    def _platforms(self) -> Float64:
-        """Return (N, P, 3) where the platforms are."""
-        simulation, movers = self._simulation, self._simulation.table.movers
-        own = simulation.table.own(PLATFORM)
-        mine = slice(own.mover, own.mover + own.movers)
-        moved = simulation.qpos[:, 7 + own.mover : 7 + own.mover + own.movers]
-        places: Float64 = movers.centre[0, mine] + moved[..., None] * movers.along[0, mine]
-        return places
 
     def _steered(self, held: Int64, aims: Float64) -> Int64:
         """Return what each game holds now, (N,)."""
@@ -279,24 +270,27 @@ GENERATED_BUDGET: Final = 600_000
 _MOST_ATTEMPTS: Final = 20
 
 
-def won_level(seed: int, difficulty: float = 0.5) -> Won:
+def won_level(seed: int, difficulty: float = 0.5, *, version: int = LATEST) -> Won:
     """Return the first generated level of a seed and difficulty that the solver wins.
 
     Args:
         seed: see `roller_env.level.generate.generate`.
         difficulty: likewise.
+        version: likewise.
 
     Raises:
+        ValueError: likewise.
         RuntimeError: none of twenty was won.
     """
     steps = 0
     for attempt in range(_MOST_ATTEMPTS):
-        level = generate(seed, difficulty, attempt)
+        level = generate(seed, difficulty, attempt, version=version)
         search = Search(level)
         solution = search.run(GENERATED_BUDGET)
         steps += search.steps
         if solution is not None:
             return Won(level, search.replay(solution), attempt + 1, steps)
     raise RuntimeError(
-        f"seed {seed}, difficulty {difficulty:g}: none of {_MOST_ATTEMPTS} levels was won"
+        f"seed {seed}, difficulty {difficulty:g}, version {version}: none of {_MOST_ATTEMPTS} "
+        "levels was won"
     )

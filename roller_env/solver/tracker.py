@@ -1,184 +1,175 @@
-"""A player that follows a play, so that it is known whether more than its very bits are winnable.
+"""A player that follows a play from wherever its ball is, and knows when not to.
 
-Every control step it looks which moment of the play its ball is nearest to, and holds the keys that
-bring it nearest to where the play was a little later: model predictive control over one action.
+Following is `Reference`'s law. Every few control steps the player has a model of the game, on the
+rigid engine, go on for a while as the law says. Where that ends well it is done. Where the ball
+would be lost, or left behind, the model tries each direction for a moment before it follows again,
+and the best of these is held: the rollout algorithm (D. Bertsekas, *Rollout, Policy Iteration, and
+Distributed Reinforcement Learning*, 2020). So a ball waits on the quay until rolling on ends on the
+ferry, and comes to a spring as fast as the landing needs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import itertools
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from gymnasium.utils import seeding
 
 from roller_env.arrays import Float64, Int64
 from roller_env.game.actions import DIRECTIONS, forces
-from roller_env.level import Level
-from roller_env.replay.contents import Replay
-from roller_env.simulation import Simulation
-from roller_env.solver.search import STEP_S, Search, solver_config
+from roller_env.simulation import Simulation, Snapshot
+from roller_env.solver.platforms import Platforms
+from roller_env.solver.reference import Reference
+from roller_env.solver.search import solver_config
 
-_AHEAD: Final = 3
-"""Control steps that it looks ahead."""
+_LOOK: Final = 25
+"""Control steps that the model goes on for."""
 
-_WINDOW: Final = 10
-"""Control steps by which it may catch up at once."""
+_EVERY: Final = 2
+"""Control steps after which it is asked again."""
 
-_SPEED_S: Final = 0.1
-"""Seconds by which a difference of speeds counts as one of places."""
+_LENGTHS: Final = (4, 8, 2, 12)
+"""Control steps for which it tries directions, in turn."""
 
-_PACE_M: Final = 0.05
-"""What a step out of the play's pace counts."""
+_BEHIND: Final = 10
+"""Moments of the play by which it may end short of what the play does in that time."""
 
-_ROLLING: Final = 1.4
-"""Inertia of a ball that rolls, over its mass."""
+_OFF_M: Final = 0.5
+"""And so far from the play."""
 
+_PROGRESS_M: Final = 0.1
+"""Distance from the play that a moment of it is worth."""
 
-@dataclass(frozen=True, slots=True)
-class Robustness:
-    """What became of a play that was followed from many starts.
+_COIN_M: Final = 1.5
+"""And what a coin of the play is worth that is collected, too."""
 
-    Attributes:
-        physics: name of the preset.
-        games: how many.
-        finished: share of them that ended at the finish.
-        coins: share of the coins that they collected, in the mean.
-    """
-
-    physics: str
-    games: int
-    finished: float
-    coins: float
+_LOST: Final = 1e6
+_WON: Final = -1e6
 
 
 class Tracker:
-    """Follows a play in every row of a simulation."""
+    """Follows a play in every row of a simulation of its level, on any physics."""
 
-    def __init__(self, place: Float64, velocity: Float64, mass_kg: float, games: int):
-        """Take the play's places, (T, 3) metres, and velocities, (T, 3) m/s, one a control step."""
-        self._place, self._velocity = place, velocity
-        self._push = forces("directions", np.arange(len(DIRECTIONS))) / (_ROLLING * mass_kg)
-        self._at = np.zeros(games, dtype=np.int64)
+    def __init__(self, reference: Reference, simulation: Simulation) -> None:
+        """Begin at the play's first moment, in games that begin.
 
-    def __call__(self, simulation: Simulation) -> Int64:
-        """Return what to hold in each row, (N,) indices of `DIRECTIONS`."""
-        ball, velocity = simulation.ball_position, simulation.ball_velocity
-        last = len(self._place) - 1
-        window = np.minimum(self._at[:, None] + np.arange(_WINDOW + 1), last)
-        away = np.linalg.norm(ball[:, None] - self._place[window], axis=2)
-        away += _SPEED_S * np.linalg.norm(velocity[:, None] - self._velocity[window], axis=2)
-        away += _PACE_M * np.abs(np.arange(_WINDOW + 1) - 1)
-        self._at = window[np.arange(len(window)), away.argmin(axis=1)]
-        ahead = np.minimum(self._at + _AHEAD, last)
-        time = _AHEAD * STEP_S
-        there = ball[:, None, :2] + time * velocity[:, None, :2] + 0.5 * time**2 * self._push
-        then = velocity[:, None, :2] + time * self._push
-        off = np.linalg.norm(there - self._place[ahead, None, :2], axis=2)
-        off += _SPEED_S * np.linalg.norm(then - self._velocity[ahead, None, :2], axis=2)
-        best: Int64 = off.argmin(axis=1)
-        return best
+        Args:
+            reference: the play.
+            simulation: of its level, as `solver_config` makes it; no row's game is over.
+        """
+        self._reference, self._simulation = reference, simulation
+        self._platforms = Platforms.of(simulation)
+        self._moment, self._direction, self._held = np.zeros((3, simulation.num_envs), np.int64)
+        self._lengths = itertools.cycle(_LENGTHS)
+        self._model = Simulation(
+            solver_config(simulation.level), simulation.num_envs * (len(DIRECTIONS) + 1)
+        )
+        self._model.reset()
+        self._blank = self._model.snapshot()
 
-
-def robustness(
-    replay: Replay, level: Level | str, physics: str, games: int = 100, seed: int = 1
-) -> Robustness:
-    """Follow a play of the solver's from many starts within the level's jitter.
-
-    Args:
-        replay: the play, as `roller_env.solver.search.solve` returns it.
-        level: that it is of.
-        physics: name of the preset on which it is followed.
-        games: how many starts.
-        seed: of the starts.
-    """
-    config = solver_config(level, physics)
-    place, velocity = _ways(replay, level)
-    simulation = Simulation(config, games)
-    simulation.seed([seeding.np_random(seed + row)[0] for row in range(games)])
-    simulation.reset()
-    tracker = Tracker(place, velocity, simulation.level.ball.mass_kg, games)
-    # Who lags behind gets half of the time more.
-    for _ in range(round(1.5 * len(place)) + 20):
-        simulation.step(forces("directions", tracker(simulation)))
-        if simulation.state.over.all():
-            break
-    finished = simulation.state.finished
-    share = simulation.state.coins / np.maximum(simulation.coins_in_level, 1)
-    return Robustness(physics, games, float(finished.mean()), float(share.mean()))
-
-
-def _ways(replay: Replay, level: Level | str) -> tuple[Float64, Float64]:
-    """Return where the ball of a play is, and how fast, before each control step and at the end."""
-    simulation = Simulation(solver_config(level))
-    simulation.seed([seeding.np_random(replay.seed)[0]])
-    simulation.reset()
-    places, velocities = [simulation.ball_position[0]], [simulation.ball_velocity[0]]
-    for force in replay.force_n:
-        simulation.step(force[None])
-        places.append(simulation.ball_position[0])
-        velocities.append(simulation.ball_velocity[0])
-    return np.array(places), np.array(velocities)
-
-
-@dataclass(frozen=True, slots=True)
-class Proof:
-    """A play that is followed from other starts, too.
-
-    Attributes:
-        replay: the play.
-        robustness: of it, on each physics that was asked for.
-        steps: environment steps of the searches for it and for those that were less robust.
-    """
-
-    replay: Replay
-    robustness: tuple[Robustness, ...]
-    steps: int
-
-    @property
-    def finished(self) -> float:
-        """The share that ends at the finish on the physics where it is least."""
-        return min(one.finished for one in self.robustness)
-
-
-ROBUST: Final = 0.9
-"""Share of the games at the finish from which on a play counts as robust."""
-
-
-def prove(
-    level: Level | str,
-    budget: int = 5_000_000,
-    all_coins: bool = False,
-    seed: int = 0,
-    physics: Sequence[str] = ("rigid", "default"),
-    games: int = 100,
-    tries: int = 8,
-) -> Proof | None:
-    """Return a robust play of a level; else the most robust one found; None if none was found.
-
-    Args:
-        level: the level, or the name or path of one.
-        budget: environment steps of all searches together.
-        all_coins: see `roller_env.solver.search.solve`.
-        seed: of the first search; each other has the next one.
-        physics: names of the presets on which it is followed.
-        games: from how many starts.
-        tries: searches at most.
-    """
-    best, left = None, budget
-    for number in range(tries):
-        search = Search(level, seed + number)
-        solution = search.run(left, all_coins)
-        left -= search.steps
-        if solution is not None:
-            replay = search.replay(solution)
-            found = tuple(robustness(replay, level, each, games) for each in physics)
-            proof = Proof(replay, found, budget - left)
-            if best is None or proof.finished > best.finished:
-                best = proof
-            if best.finished >= ROBUST:
+    def play(self, steps: int) -> None:
+        """Play on until every game is over, for so many control steps at the most."""
+        simulation = self._simulation
+        for step in range(steps):
+            if simulation.state.over.all():
                 break
-        if left <= 0:
-            break
-    return best
+            if step % _EVERY == 0:
+                rows = np.flatnonzero(~simulation.state.over)
+                plan = self._planned(rows)
+            self._moment = self._nearest(simulation, self._moment)
+            actions = np.zeros(simulation.num_envs, dtype=np.int64)
+            actions[rows] = plan[step % _EVERY]
+            simulation.step(forces("directions", actions))
+
+    def _planned(self, rows: Int64) -> Int64:
+        """Return what to hold in rows in each of the next steps, (`_EVERY`, n).
+
+        A plan is a direction, and for how many steps it is held before the law is followed. A game
+        keeps its plan until it looks bad and another looks better.
+        """
+        games, moment = self._modelled(rows), self._moment[rows]
+        direction, held = self._direction[rows], self._held[rows]
+        actions, cost = self._tried(games, moment, direction, held)
+        doubtful = np.flatnonzero(cost > _OFF_M - _PROGRESS_M * self._expected(moment))
+        if len(doubtful):
+            count = len(DIRECTIONS) + 1
+            each = np.repeat(doubtful, count)
+            directions = np.tile(np.arange(count) % len(DIRECTIONS), len(doubtful))
+            # The last of them is the law alone.
+            lengths = np.tile(np.append(np.full(count - 1, next(self._lengths)), 0), len(doubtful))
+            others, costs = self._tried(games.take(each), moment[each], directions, lengths)
+            best = costs.reshape(-1, count).argmin(axis=1) + count * np.arange(len(doubtful))
+            better = costs[best] < cost[doubtful]
+            best, mended = best[better], doubtful[better]
+            actions[:, mended] = others[:, best]
+            direction[mended], held[mended] = directions[best], lengths[best]
+        self._direction[rows], self._held[rows] = direction, np.maximum(held - _EVERY, 0)
+        return actions
+
+    def _expected(self, moment: Int64) -> Int64:
+        """Return the moment that a game ends at, at least, if it is followed well."""
+        expected: Int64 = np.minimum(moment + _LOOK, len(self._reference) - 1) - _BEHIND
+        return expected
+
+    def _modelled(self, rows: Int64) -> Snapshot:
+        """Return games as the model has them: on the rigid engine, of which it takes the bodies."""
+        now = self._simulation.snapshot(rows)
+        games = replace(self._blank.take(np.arange(len(rows))), game=now.game)
+        for name in ("position", "orientation", "velocity", "angular_velocity", "displacement"):
+            getattr(games.bodies, name)[:] = getattr(now.bodies, name)
+        return games
+
+    def _tried(
+        self, games: Snapshot, moment: Int64, direction: Int64, held: Int64
+    ) -> tuple[Int64, Float64]:
+        """Return what n games hold in their first steps, (`_EVERY`, n), and the costs, (n,) metres.
+
+        Args:
+            games: to go on from.
+            moment: (n,) of the play that they are at.
+            direction: (n,) what to hold at first, indices of `DIRECTIONS`.
+            held: (n,) for how many steps; then the law is followed.
+        """
+        model, count = self._model, len(games)
+        model.restore(games)
+        hold = np.arange(model.num_envs) >= count
+        actions = np.zeros((_LOOK, model.num_envs), dtype=np.int64)
+        won, missed = np.zeros(count, dtype=np.int64), self._missed(model, moment)
+        for step in range(_LOOK):
+            moment = self._nearest(model, moment)
+            followed = self._steered(model, moment)
+            actions[step, :count] = np.where(step < held, direction, followed)
+            model.step(forces("directions", actions[step]), hold)
+            won += model.state.finished[:count]
+        moment = self._nearest(model, moment)
+        cost = self._off(model, moment) - _PROGRESS_M * moment
+        cost += _COIN_M * (self._missed(model, moment) - missed)
+        cost[model.state.over[:count]] = _LOST
+        cost[won > 0] = _WON - won[won > 0]
+        return actions[:_EVERY, :count], cost
+
+    def _missed(self, simulation: Simulation, moment: Int64) -> Int64:
+        """Return how many coins less games have than the play had, (n,)."""
+        missing = self._reference.coins[moment] - simulation.state.coins[: len(moment)]
+        missed: Int64 = np.maximum(missing, 0)
+        return missed
+
+    def _steered(self, simulation: Simulation, moment: Int64) -> Int64:
+        rows = slice(len(moment))
+        ball, velocity = simulation.ball_position[rows], simulation.ball_velocity[rows]
+        return self._reference.steering(moment, ball, velocity)
+
+    def _nearest(self, simulation: Simulation, moment: Int64) -> Int64:
+        return self._reference.nearest(moment, *self._bodies(simulation, len(moment)))
+
+    def _off(self, simulation: Simulation, moment: Int64) -> Float64:
+        off = self._reference.off(moment[:, None], *self._bodies(simulation, len(moment)))
+        return off[:, 0]
+
+    def _bodies(self, simulation: Simulation, count: int) -> tuple[Float64, Float64, Float64]:
+        """Return what the reference asks of the first games of a simulation; see its `off`."""
+        displacement = self._platforms.displacement(simulation)
+        bodies = simulation.ball_position, simulation.ball_velocity, displacement
+        ball, velocity, moved = (each[:count] for each in bodies)
+        return ball, velocity, moved

@@ -1,4 +1,4 @@
-"""``Roller/Generated-v0``: another level in every episode, each of them proved winnable."""
+"""``Roller/Generated-v1``: another level in every episode, each of them proved winnable."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
 import roller_env
-from roller_env.level.generate import generate
+from roller_env.level.generate import VERSIONS, generate
 from roller_env.level.proved import proved_levels, read_verdicts, verdicts, write_verdicts
 from roller_env.solver import Search
 from roller_env.solver.search import GENERATED_BUDGET
 
-ID = roller_env.GENERATED_ID
+ID = "Roller/Generated-v1"
 
 
 def test_it_is_a_correct_environment() -> None:
@@ -51,6 +51,20 @@ def test_train_and_test_sets_are_ranges_of_seeds() -> None:
     ]
 
 
+def test_each_id_keeps_to_its_version_of_the_generator() -> None:
+    for name, options in roller_env.GENERATED_IDS.items():
+        env = gym.make(name, num_levels=2, disable_env_checker=True)
+        levels = env.unwrapped.simulation.levels  # type: ignore[attr-defined]
+        assert list(levels) == proved_levels(2, version=options["version"])
+        assert options["num_levels"] <= len(verdicts(options["version"])[0.25])
+
+
+def test_an_agent_fits_every_range_of_levels() -> None:
+    few = gym.make(ID, num_levels=1, start_level=1_000_000, disable_env_checker=True)
+    many = gym.make(ID, num_levels=20, disable_env_checker=True)
+    assert few.observation_space == many.observation_space
+
+
 def test_it_is_made_again_from_its_spec() -> None:
     env = gym.make(ID, num_levels=2, start_level=5)
     assert env.spec is not None
@@ -59,7 +73,7 @@ def test_it_is_made_again_from_its_spec() -> None:
 
 
 def test_a_level_that_nobody_proved_is_refused_and_what_there_is_is_told() -> None:
-    with pytest.raises(ValueError, match=r"found seed 77777 .* there are difficulty"):
+    with pytest.raises(ValueError, match=r"found seed 77777 .* of version 2 there are difficulty"):
         gym.make(ID, start_level=77_777)
     with pytest.raises(ValueError, match="difficulty"):
         gym.make(ID, difficulty=0.123)
@@ -67,13 +81,18 @@ def test_a_level_that_nobody_proved_is_refused_and_what_there_is_is_told() -> No
         gym.make(ID, num_levels=0)
 
 
-@pytest.mark.parametrize("difficulty", sorted(verdicts()))
-def test_what_the_table_says_is_won_is_won(difficulty: float) -> None:
-    """Some of each difficulty, searched anew."""
-    for seed in (0, 17, 1_000_003):
-        level = generate(seed, difficulty, verdicts()[difficulty][seed])
-        solution = Search(level).run(GENERATED_BUDGET)
-        assert solution is not None
+@pytest.mark.parametrize("version", VERSIONS)
+def test_what_the_table_says_is_won_is_won(version: int) -> None:
+    """Some of the two easiest difficulties, searched anew."""
+    for difficulty in sorted(verdicts(version))[:2]:
+        known = verdicts(version)[difficulty]
+        seeds = sorted(known)
+        for seed in (seeds[0], seeds[len(seeds) // 2], seeds[-1]):
+            attempt = known[seed]
+            solution = Search(generate(seed, difficulty, attempt, version=version)).run(
+                GENERATED_BUDGET
+            )
+            assert solution is not None
 
 
 def test_a_table_is_read_as_it_was_written(tmp_path: Path) -> None:

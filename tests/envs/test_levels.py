@@ -109,7 +109,7 @@ def test_a_copy_a_pickle_and_a_state_go_on_with_the_same_bits() -> None:
 
 
 def test_hundreds_of_generated_levels_are_played_at_once() -> None:
-    levels = [generate(seed, (seed % 11) / 10) for seed in range(200)]
+    levels = [generate(seed, (seed % 11) / 10, version=1) for seed in range(200)]
     env = RollerVectorEnv(64, levels=levels, physics="rigid", max_episode_steps=20)
     env.reset(seed=0)
     env.action_space.seed(0)

@@ -8,14 +8,16 @@ import pandas
 import pytest
 
 from roller_env.lab import generated
+from roller_env.level.generate import LATEST
 from scripts import generated as script
 
 
 def test_the_script_goes_on_where_it_was_stopped(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(generated, "GAMES", 3)
     file = tmp_path / "generated.csv"
-    generated.run(file, 1, (0.0,))
+    generated.run(file, 1, LATEST, (0.0,))
     (first,) = file.read_text().splitlines()[1:]
     script.main(script.Arguments(quick=True, out=file))
     rows = pandas.read_csv(file)

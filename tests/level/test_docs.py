@@ -67,7 +67,7 @@ def test_the_python_examples_run(tmp_path: Path) -> None:
         capture_output=True,
         text=True,
     )
-    assert run.stdout.split() == ["hello", *2 * ["generated-v1-7-200"], "plank"]
+    assert run.stdout.split() == ["hello", *2 * ["generated-v2-7-200"], "plank"]
 
 
 def test_the_tables_are_what_the_models_say() -> None:

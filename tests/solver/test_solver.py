@@ -7,8 +7,12 @@ import pytest
 
 from roller_env.level import Level, load_level, shipped_levels
 from roller_env.replay import verify
+from roller_env.simulation import Simulation
 from roller_env.solver import Search, prove, robustness, solve
 from roller_env.solver.archive import MOST_CELLS, Archive, Node
+from roller_env.solver.reference import Reference
+from roller_env.solver.search import solver_config
+from roller_env.solver.tracker import Tracker
 from tests.builders import make_level
 
 BUDGET = 1_000_000
@@ -53,12 +57,48 @@ def test_what_is_not_found_in_the_budget_is_told_as_that() -> None:
 
 
 def test_a_proof_holds_from_other_starts_on_both_engines() -> None:
-    proof = prove("gate", BUDGET, games=50)
+    proof = prove("gate", BUDGET, games=20)
     assert proof is not None
     assert proof.finished >= 0.9
     assert [one.physics for one in proof.robustness] == ["rigid", "default"]
-    again = robustness(proof.replay, "gate", "rigid", 50)
+    again = robustness(proof.replay, "gate", "rigid", 20)
     assert again == proof.robustness[0]
+
+
+def test_a_ball_that_comes_too_late_waits_for_the_ferry() -> None:
+    level = make_level(
+        start={"at": (0.0, 0.0, 0.4064), "jitter": (0.3, 0.3)},
+        boxes=[
+            {"at": (0.0, 0.0, -0.2), "size": (3.0, 3.0, 0.4)},
+            {"at": (10.0, 0.0, -0.2), "size": (3.0, 3.0, 0.4)},
+        ],
+        platforms=[
+            {
+                "name": "ferry",
+                "at": (2.52, 0.0, -0.2),
+                "to": (7.48, 0.0, -0.2),
+                "size": (2.0, 2.0, 0.4),
+                "speed": 2.0,
+            }
+        ],
+        finish={"at": (10.0, 0.0, 0.6), "size": (0.9, 0.9, 1.2)},
+    )
+    replay = solve(level, BUDGET)
+    assert replay is not None
+    games = 8
+    simulation = Simulation(solver_config(level, "default"), games)
+    simulation.reset()
+    for row in range(games):  # as many, each held up for longer
+        hold = np.arange(games) <= row
+        simulation.step(np.zeros((games, 2)), hold)
+    Tracker(Reference.of(replay, level), simulation).play(2 * len(replay) + 120)
+    assert simulation.state.finished.all()
+
+
+def test_a_spring_is_entered_as_fast_as_the_landing_needs() -> None:
+    proof = prove("springs", BUDGET, games=20, tries=1)
+    assert proof is not None
+    assert proof.finished >= 0.9
 
 
 def test_an_archive_keeps_the_soonest_game_of_a_cell_and_never_more_than_it_may() -> None:

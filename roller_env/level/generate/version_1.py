@@ -1,11 +1,8 @@
-"""Levels without end: platforms on a grid, joined along a route by what a ball can roll over.
+"""Version 1 of the generator: decks on a grid, joined along a route by what a ball can roll over.
 
 A level is a self-avoiding walk from platform to platform. What joins two of them is a plank, a
 ramp, a step down, a gap with the far side lower, or a plank with a gate whose plate lies on a
-platform before it. Side platforms with coins branch off. Whether a level can be won is not asked
-here: `roller_env.solver.won_level` hands out those that were.
-
-The same seed and difficulty give the same level for ever, under one `VERSION`.
+platform before it. Side platforms with coins branch off.
 """
 
 from __future__ import annotations
@@ -14,13 +11,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-
-from roller_env import checks
-from roller_env.level.load import load_level
-from roller_env.level.schema import Level
-
-VERSION: Final = 1
-"""Of what `generate` makes; anything that changes a level makes another one."""
 
 PITCH_M: Final = 4.4
 """Distance of the grid's places."""
@@ -80,43 +70,22 @@ class Knobs:
         )
 
 
-def generate(seed: int, difficulty: float = 0.5, attempt: int = 0) -> Level:
-    """Return a level.
-
-    Args:
-        seed: which one, a whole number from 0 on.
-        difficulty: 0 to 1; see `Knobs`.
-        attempt: another level for the same seed, where the first could not be won.
-
-    Raises:
-        ValueError: the seed is no whole number from 0 on, or the difficulty none from 0 to 1.
-    """
-    seed = checks.whole("seed", seed, 0, 2**63 - 1)
-    difficulty = checks.number("difficulty", difficulty, 0.0, 1.0, "a number from 0 to 1")
-    rng = np.random.default_rng([VERSION, seed, round(1e6 * difficulty), attempt])
+def fields(difficulty: float, rng: np.random.Generator) -> dict[str, Any]:
+    """Return what a level of a difficulty, 0 to 1, consists of, but for its name."""
     knobs = Knobs.of(difficulty, rng)
     builder = _Builder(knobs, rng)
     builder.build()
-    parts = builder.parts
-    name = f"generated-v{VERSION}-{seed}-{round(1000 * difficulty)}"
-    return load_level(
-        Level.model_validate(
-            {
-                "name": name if attempt == 0 else f"{name}-{attempt}",
-                "title": f"Level {seed}",
-                "description": f"Made by the generator, difficulty {difficulty:g}.",
-                "time_limit_s": 30.0 + 8.0 * knobs.platforms,
-                "kill_height": min(0.0, builder.lowest) - 12.0,
-                "materials": {
-                    "deck": {"colour": "#2a9d8f", "pattern": "checker"},
-                    "plank": {"colour": "#3f7fd6", "pattern": "grid"},
-                    "ice": {"colour": "#bfe6ff", "friction": 0.25},
-                    "kerb": {"colour": "#46566e"},
-                },
-                **parts,
-            }
-        )
-    )
+    return {
+        "time_limit_s": 30.0 + 8.0 * knobs.platforms,
+        "kill_height": min(0.0, builder.lowest) - 12.0,
+        "materials": {
+            "deck": {"colour": "#2a9d8f", "pattern": "checker"},
+            "plank": {"colour": "#3f7fd6", "pattern": "grid"},
+            "ice": {"colour": "#bfe6ff", "friction": 0.25},
+            "kerb": {"colour": "#46566e"},
+        },
+        **builder.parts,
+    }
 
 
 class _Builder:
