@@ -7,7 +7,7 @@ const GHOST = 8;
 /** Return a frame's bytes, written by hand from the layout that the server documents. */
 function frameBytes({ flags = 0, coins = 10, crowd = [] as number[][] } = {}): ArrayBuffer {
   const [movers, machines] = [2, 3];
-  const length = 96 + 4 * movers + machines + Math.ceil(coins / 8);
+  const length = 98 + 4 * movers + machines + Math.ceil(coins / 8);
   const view = new DataView(new ArrayBuffer(length + (crowd.length ? 2 + 6 * crowd.length : 0)));
   for (const [at, value] of [
     [0, 1],
@@ -17,7 +17,7 @@ function frameBytes({ flags = 0, coins = 10, crowd = [] as number[][] } = {}): A
     [30, 1 + 8],
     [31, 0],
     [94, movers],
-    [95, machines],
+    [96, machines],
   ] as const) {
     view.setUint8(at, value);
   }
@@ -36,11 +36,11 @@ function frameBytes({ flags = 0, coins = 10, crowd = [] as number[][] } = {}): A
   floats(60, [-1, 0, 0.5]);
   floats(72, [50, 0.25, 4, 5, 6]);
   view.setUint16(92, 3, true);
-  floats(96, [0.5, -0.25]);
+  floats(98, [0.5, -0.25]);
   [0, 1, 2].forEach((phase, i) => {
-    view.setUint8(96 + 4 * movers + i, phase);
+    view.setUint8(98 + 4 * movers + i, phase);
   });
-  view.setUint8(96 + 4 * movers + machines + 1, 0b10);
+  view.setUint8(98 + 4 * movers + machines + 1, 0b10);
   crowd.flat().forEach((place, i) => {
     view.setUint16(length, crowd.length, true);
     view.setInt16(length + 2 + 2 * i, place, true);

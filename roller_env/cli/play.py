@@ -129,6 +129,9 @@ def play(arguments: Arguments) -> int:
     keeper = ReplayKeeper(directory, player, keeps_all=arguments.record is not None)
     records = Records(arguments.records or default_file())
     crowd = crowd_of(agent, arguments)
+    if crowd is not None:
+        # What does not go together is told before anything is served.
+        crowd.steps_per_action(config.control_dt_s)
     chosen = str(config.level) if config.level in LEVELS else OWN
     shipped = those_shipped(agent, crowd, arguments)
     offers = offers_of(config.level)

@@ -19,7 +19,7 @@ from typing import Any, Final
 import gymnasium as gym
 import numpy as np
 
-from roller_env import ENV_IDS, GENERATED_ID
+from roller_env import ENV_IDS, GENERATED_IDS
 from roller_env.config import EnvConfig
 from roller_env.envs.generated import DIFFICULTY
 from roller_env.game.actions import DIRECTIONS
@@ -60,10 +60,11 @@ def fingerprints() -> dict[str, Any]:
     options = EnvConfig().to_json()
     del options["level"], options["num_threads"]
     ids = {name: of_level(name, given["level"]) for name, given in ENV_IDS.items() if given}
+    generated = {name: of_generated(name, own["version"]) for name, own in GENERATED_IDS.items()}
     return {
         "options": options,
         "presets": {name: asdict(preset) for name, preset in PRESETS.items()},
-        "ids": ids | {GENERATED_ID: of_generated()},
+        "ids": ids | generated,
     }
 
 
@@ -86,14 +87,14 @@ def played(level: str) -> tuple[list[int], float]:
     return replay.actions[: round(GAME_S / dt_s)].tolist(), dt_s
 
 
-def of_generated() -> dict[str, Any]:
-    """Return the fingerprint of the generated levels; any keys do, since nobody has played them."""
+def of_generated(name: str, version: int) -> dict[str, Any]:
+    """Return the fingerprint of generated levels; any keys do, since nobody has played them."""
     own: dict[str, Any] = {"num_levels": _GENERATED}
     actions = [step // 8 * 5 % len(DIRECTIONS) for step in range(round(GAME_S / 0.05))]
     return {
-        "level": _hash(proved_levels(_GENERATED, 0, DIFFICULTY)),
+        "level": _hash(proved_levels(_GENERATED, 0, DIFFICULTY, version=version)),
         "games": {
-            physics: game(GENERATED_ID, actions, physics=physics, **own, **options)
+            physics: game(name, actions, physics=physics, **own, **options)
             for physics, options in ASKED.items()
             if PRESETS[physics].engine == "rigid"
         },

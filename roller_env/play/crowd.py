@@ -16,6 +16,7 @@ from roller_env.training.files import RunError
 from roller_env.training.policy import TrainedPolicy
 
 MOST: Final = 256
+_ROUNDING: Final = 1e-9
 
 
 class Crowd:
@@ -37,6 +38,21 @@ class Crowd:
         self._per_action = 1
         self._forces = np.zeros((count, 2))
         self._before = self._after = np.zeros((count, 3))
+
+    def steps_per_action(self, control_dt_s: float) -> int:
+        """Return for how many control steps of a game an action of the agent's holds.
+
+        Raises:
+            RunError: it decides between two of them.
+        """
+        decides_s = self.policy.config.evaluation_environment.control_dt_s
+        steps = round(decides_s / control_dt_s)
+        if steps < 1 or abs(decides_s / control_dt_s - steps) > _ROUNDING:
+            raise RunError(
+                f"control_dt_s: found an agent that decides every {decides_s:g} s "
+                f"beside a game in steps of {control_dt_s:g} s; must be a multiple of them"
+            )
+        return steps
 
     def centres(self, fraction: float) -> Float64:
         """Return where the balls are, (N, 3) metres, between their last two states."""
@@ -80,14 +96,8 @@ class Crowd:
 
     def _make(self, beside: Simulation) -> Simulation:
         """Return the games, of the level, physics and time of the one that they accompany."""
+        self._per_action = self.steps_per_action(beside.duration_s)
         trained = self.policy.config.evaluation_environment
-        ratio = trained.control_dt_s / beside.duration_s
-        self._per_action = round(ratio)
-        if abs(ratio - self._per_action) > 1e-9 or self._per_action < 1:
-            raise RunError(
-                f"control_dt_s: found an agent that decides every {trained.control_dt_s:g} s "
-                f"beside a game in steps of {beside.duration_s:g} s; must be a multiple of them"
-            )
         config = replace(
             trained,
             level=beside.level,

@@ -92,7 +92,7 @@ def test_a_page_gets_its_level_and_frames(served: Served) -> None:
         assert status == 200
         assert headers["Content-Encoding"] == "gzip"
         assert json.loads(gzip.decompress(content))["name"] == "flat"
-        assert len(frame(connection)) == 96 + 2
+        assert len(frame(connection)) == 98 + 2
 
 
 def test_the_page_asks_no_other_host_for_anything(served: Served) -> None:

@@ -17,7 +17,7 @@ from roller_env.play.session import Phase
 from roller_env.play.wire import Keys, Seek, frame_bytes, keys_of, read_message
 from tests.play.lane import game, play, play_until
 
-HEAD_BYTES = 96
+HEAD_BYTES = 98
 
 
 def test_a_frame_says_where_the_ball_is_and_what_the_game_does() -> None:

@@ -11,6 +11,7 @@ import pytest
 from roller_env.assets import LEVELS, SHIPPED
 from roller_env.cli import main, play
 from roller_env.lab import baselines_page
+from roller_env.play.offers import offers_of
 from roller_env.training import load_policy
 from roller_env.training.files import RunError
 from roller_env.training.run import evaluate_policy
@@ -53,7 +54,7 @@ def test_a_page_that_goes_to_another_level_gets_the_agent_of_that_level() -> Non
     assert agent is not None
     assert crowd is not None
     shipped = play.those_shipped(agent, crowd, arguments)
-    open_game = play.game_opener(config, agent, arguments, shipped)
+    open_game = play.game_opener(config, agent, arguments, offers_of("flat"), shipped)
     for level in ("flat", "wind"):
         game = open_game(level, (crowd,))
         assert agent.policy.config.level == crowd.policy.config.level == level
