@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sqlite3
 import subprocess
 import sys
 from dataclasses import replace
@@ -15,6 +16,7 @@ from roller_env.physics.presets import physics_preset
 from roller_env.play.records import Improved, Record, Records, RecordsError, default_file
 from roller_env.replay import Replay, load_replay, shipped_replays
 from tests.play.lane import lane
+from tests.play.test_room import ENDED, Somebody, among, played, push, started, until
 
 LEVEL = lane(par_time_s=10.0)
 DEFAULT = physics_preset("default")
@@ -113,3 +115,38 @@ def test_records_are_where_programs_keep_their_data(
         monkeypatch.setenv(name, str(tmp_path / "data"))
     assert default_file().name == "records.sqlite3"
     assert tmp_path in default_file().parents
+
+
+@pytest.mark.parametrize(
+    ("statement", "message"),
+    [
+        ("create table records (level text)", "no such column: attempts"),
+        ("create table other (level text); begin exclusive", "database is locked"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_refused_before_anything_is_played(
+    tmp_path: Path, statement: str, message: str
+) -> None:
+    file = tmp_path / "records.sqlite3"
+    other = sqlite3.connect(file, isolation_level=None)
+    other.executescript(statement)
+    with pytest.raises(RecordsError, match=message):
+        Records(file)
+    other.close()
+
+
+def test_a_game_goes_on_when_its_records_are_lost(tmp_path: Path) -> None:
+    records = Records(tmp_path / "records.sqlite3")
+    room = played(records=records)
+
+    async def scene() -> None:
+        player = Somebody(room)
+        await until(lambda: bool(player.frames))
+        records.close()
+        await started(player)
+        await push(player, lambda: player.phase == ENDED)
+        await until(lambda: any(told["type"] == "result" for told in player.told))
+        assert "records cannot be kept there" in player.last("notice")["text"]
+        assert player.last("result")["best_time"]
+
+    among(room, scene)

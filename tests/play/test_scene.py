@@ -15,8 +15,9 @@ from roller_env.config import EnvConfig
 from roller_env.level import load_level
 from roller_env.level.expand import expand, shapes
 from roller_env.play.scene import Scene, coin_bits
+from roller_env.play.wire import frame_bytes
 from roller_env.simulation import Simulation
-from tests.play.lane import lane
+from tests.play.lane import game, lane
 
 MOST_BYTES = 64_000
 
@@ -75,7 +76,7 @@ def test_the_ground_has_the_area_of_the_decks() -> None:
 def test_equal_levels_are_one_scene_and_others_are_others() -> None:
     assert Scene(lane()).hash == Scene(lane()).hash
     assert Scene(lane()).content == Scene(lane()).content
-    assert Scene(lane()).hash != Scene(lane(kill_height=-7.0)).hash
+    assert Scene(lane()).hash != Scene(lane(title="Another")).hash
 
 
 def test_what_hangs_on_a_gate_goes_down_with_it() -> None:
@@ -112,3 +113,14 @@ def test_the_phases_of_machines_are_told_in_the_order_of_the_scene() -> None:
 def test_coins_are_bits_from_the_lowest() -> None:
     assert coin_bits(np.array([1, 0, 0, 0, 0, 0, 0, 0, 0, 1], dtype=bool)) == bytes([1, 2])
     assert coin_bits(np.zeros(0, dtype=bool)) == b""
+
+
+def test_a_level_of_many_machines_has_frames_too() -> None:
+    pads = [{"at": (1.0 + n % 20, n // 20 - 7.0, 0.02), "size": (0.3, 0.3, 0.04)} for n in range(300)]
+    level = lane(
+        boxes=[{"at": (10.0, 0.0, -0.5), "size": (40.0, 40.0, 1.0)}],
+        lift_pads=[{**pad, "force_n": 20.0} for pad in pads],
+    )
+    scene = Scene(level)
+    assert len(scene.machines) == 300
+    assert len(frame_bytes(game(level).frame(), scene)) == 98 + 300 + 1

@@ -114,8 +114,14 @@ def test_nothing_else_is_served(served: Served, path: str) -> None:
     assert get(served.url(path))[0] == 404
 
 
-def test_the_page_is_reached_by_no_other_name(served: Served) -> None:
-    assert get(served.url(), Host="evil.example")[0] == 400
+@pytest.mark.parametrize("name", ["evil.example", "localhost.evil.example", "10.0.0.1", ""])
+def test_the_page_is_reached_by_no_other_name(served: Served, name: str) -> None:
+    assert get(served.url(), Host=name)[0] == 400
+
+
+@pytest.mark.parametrize("name", ["localhost", "127.0.0.1:80", "[::1]:9999", "LOCALHOST"])
+def test_the_page_is_reached_by_this_machines_names(served: Served, name: str) -> None:
+    assert get(served.url(), Host=name)[0] == 200
 
 
 @pytest.mark.parametrize(

@@ -366,6 +366,37 @@ def test_whoever_goes_back_and_does_the_same_again_gets_the_same_bits() -> None:
     assert session.practice
 
 
+def test_whoever_leaves_while_looking_back_keeps_the_whole_game() -> None:
+    recording = Recording()
+    session = game(observers=[recording])
+    play(session, 1.0, "w")
+    session.pause()
+    session.seek(0.2)
+    session.restart()
+    assert len(recording.replays[0]) == 240
+    assert verify(recording.replays[0]).is_exact
+
+
+def test_a_game_played_step_by_step_is_practice() -> None:
+    session = game()
+    session.pause()
+    session.step_once("w")
+    assert session.practice
+
+
+def test_the_intro_is_no_time_of_a_players() -> None:
+    session = game(skip_intro=False)
+    play_until(session, Phase.PLAYING)
+    play(session, 1.0, "w")
+    session.pause()
+    assert session.intro_s == INTRO_S
+    assert session.moments_s == pytest.approx((0.0, 1.0), abs=2 * FRAME_S)
+    session.seek(0.0)
+    assert session.result.time_s == pytest.approx(INTRO_S)
+    session.restart()
+    assert session.intro_s == 0.0
+
+
 def test_only_in_a_pause_one_goes_back() -> None:
     session = game()
     play(session, 0.5, "w")

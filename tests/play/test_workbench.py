@@ -52,7 +52,7 @@ def test_a_saved_level_is_loaded_anew_and_what_is_wrong_is_told_with_its_line(
         assert "did you mean 'time_limit_s'" in error["text"]
         # The level that was right is still there to be played.
         assert author.last("level")["scene"] == first
-        file.write_text(good.replace("time_limit_s: 60", "time_limit_s: 61"))
+        file.write_text(good.replace("A first level", "A second level"))
         await until(lambda: author.last("level")["scene"] != first)
         assert author.last("problems")["errors"] == []
 
