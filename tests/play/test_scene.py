@@ -116,7 +116,9 @@ def test_coins_are_bits_from_the_lowest() -> None:
 
 
 def test_a_level_of_many_machines_has_frames_too() -> None:
-    pads = [{"at": (1.0 + n % 20, n // 20 - 7.0, 0.02), "size": (0.3, 0.3, 0.04)} for n in range(300)]
+    pads = [
+        {"at": (1.0 + n % 20, n // 20 - 7.0, 0.02), "size": (0.3, 0.3, 0.04)} for n in range(300)
+    ]
     level = lane(
         boxes=[{"at": (10.0, 0.0, -0.5), "size": (40.0, 40.0, 1.0)}],
         lift_pads=[{**pad, "force_n": 20.0} for pad in pads],
