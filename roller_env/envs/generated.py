@@ -59,6 +59,7 @@ class GeneratedVectorEnv(RollerVectorEnv):
     """N games on generated levels; see `GeneratedEnv`.
 
     Version history:
+        v1: levels of version 2 of the generator, which has every kind of piece; ``kinds="all"``.
         v0: the first version.
     """
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import struct
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -82,7 +83,16 @@ def among(room: Room, scene: Callable[[], Awaitable[None]]) -> None:
             await asyncio.gather(running, return_exceptions=True)
             room.close()
 
-    asyncio.run(everything())
+    apart(everything)
+
+
+def apart(happens: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    """Let something happen in an event loop of a thread of its own.
+
+    In this one Playwright may have one that runs, for tests in a browser.
+    """
+    with ThreadPoolExecutor(max_workers=1) as thread:
+        thread.submit(lambda: asyncio.run(happens())).result()
 
 
 async def until(condition: Callable[[], bool]) -> None:

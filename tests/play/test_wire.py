@@ -112,7 +112,7 @@ JSON = st.recursive(
 KINDS = ["keys", "seek", "speed", "choose", "ghost", "start", "x"]
 
 
-@settings(max_examples=10_000, deadline=None)
+@settings(max_examples=2_000, deadline=None)
 @given(
     st.text(max_size=80)
     | JSON.map(json.dumps)

@@ -11,7 +11,7 @@ import pytest
 from roller_env.level.template import new_level
 from roller_env.play.workbench import Workbench
 from tests.patience import STALLED_S
-from tests.play.test_room import Somebody, until
+from tests.play.test_room import Somebody, apart, until
 
 
 @pytest.fixture(autouse=True)
@@ -30,7 +30,7 @@ def beside(bench: Workbench, scene: Callable[[Somebody], object]) -> None:
                 doing.cancel()
             await asyncio.gather(*doings, return_exceptions=True)
 
-    asyncio.run(everything())
+    apart(everything)
 
 
 def test_a_saved_level_is_loaded_anew_and_what_is_wrong_is_told_with_its_line(

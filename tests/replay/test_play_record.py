@@ -15,7 +15,7 @@ from roller_env.cli import play
 from roller_env.play.room import Room
 from roller_env.replay import load_replay, verify
 from roller_env.replay.keeper import ReplayKeeper
-from tests.play.test_room import Somebody, push, started
+from tests.play.test_room import Somebody, apart, push, started
 from tests.replay.recording import pushed_otherwise, wandered
 
 minari = pytest.importorskip("minari", reason="the extra 'demos' is not installed")
@@ -86,7 +86,7 @@ def test_what_fails_while_it_is_played_costs_nothing_of_what_was_played(
             room.close()
             raise RuntimeError("the page is gone")
 
-        asyncio.run(lost())
+        apart(lost)
 
     monkeypatch.setattr(play, "serve", serve)
     records = tmp_path / "records.sqlite3"
