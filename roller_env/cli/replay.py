@@ -5,6 +5,7 @@ Examples::
     roller replay classic
     roller replay classic --show
     roller replay classic --html classic.html
+    roller replay mine.replay --against flat --show
     roller replay mine.replay --video mine.mp4 --sheet mine.png
     roller replay old.replay --convert new.replay
     roller replay replays --record roller/human
@@ -63,6 +64,10 @@ class Arguments:
     html: Path | None = None
     """Write it as one file that anybody opens in a browser, an .html: no server, no network."""
 
+    against: str | None = None
+    """Another replay, a file or a level's shipped one: on the page or in the .html its ball rolls
+    beside as a ghost."""
+
     video: Path | None = None
     """Film it, to an .mp4 or a .gif."""
 
@@ -102,11 +107,8 @@ def main(argv: Sequence[str] | None = None, prog: str | None = None) -> int:
 def _replay(arguments: Arguments) -> int:
     _check(arguments)
     listening = _listening(arguments) if arguments.show else None
-    shipped = shipped_replays()
-    if arguments.file not in shipped and not Path(arguments.file).exists():
-        known = ", ".join(shipped)
-        raise ReplayError(f"{arguments.file}: there is no such file; shipped are {known}")
-    file = shipped.get(arguments.file, Path(arguments.file))
+    file = _file_of(arguments.file)
+    against = None if arguments.against is None else load_replay(_file_of(arguments.against))
     if arguments.record is not None:
         return _record(file, arguments.record)
     if arguments.convert is not None:
@@ -132,10 +134,19 @@ def _replay(arguments: Arguments) -> int:
         # Imported here: it takes what pages are made with.
         from roller_env.play.html import write_html
 
-        print(f"written to {write_html(replay, arguments.html)}")
+        print(f"written to {write_html(replay, arguments.html, against)}")
     if listening is not None:
-        _show(replay, listening)
+        _show(replay, against, listening)
     return status
+
+
+def _file_of(name: str) -> Path:
+    """Return a shipped replay's file by the name of its level, or the file of that name."""
+    shipped = shipped_replays()
+    if name not in shipped and not Path(name).exists():
+        known = ", ".join(shipped)
+        raise ReplayError(f"{name}: there is no such file; shipped are {known}")
+    return shipped.get(name, Path(name))
 
 
 def _listening(arguments: Arguments) -> socket:
@@ -168,17 +179,16 @@ def _record(source: Path, prefix: str) -> int:
     return 1 if problems or written.problems else 0
 
 
-def _show(replay: Replay, listening: socket) -> None:
+def _show(replay: Replay, against: Replay | None, listening: socket) -> None:
     # Imported here: the rest needs no server.
     from roller_env.play.replay_session import ReplaySession
     from roller_env.play.room import Offer, Room
     from roller_env.play.server import serve
 
     name = replay.level.name
-    serve(
-        Room(lambda _, __: ReplaySession(replay), [Offer(name, replay.level)], name, mode="replay"),
-        listening,
-    )
+    offer = Offer(name, replay.level)
+    room = Room(lambda *_: ReplaySession(replay), [offer], name, mode="replay", rival=against)
+    serve(room, listening)
 
 
 def _check(arguments: Arguments) -> None:

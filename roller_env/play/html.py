@@ -16,6 +16,7 @@ from typing import Final
 
 from roller_env.assets import asset_directory
 from roller_env.game.result import EpisodeResult
+from roller_env.play.ghost import Ghost
 from roller_env.play.replay_session import ReplaySession
 from roller_env.play.scene import Scene
 from roller_env.play.wire import frame_bytes
@@ -48,8 +49,12 @@ _PAGE: Final = """<!doctype html>
 """
 
 
-def replay_html(replay: Replay) -> str:
+def replay_html(replay: Replay, against: Replay | None = None) -> str:
     """Return a page that shows a replay.
+
+    Args:
+        replay: what to show.
+        against: another one, of which the ball rolls beside as a ghost.
 
     Raises:
         FileNotFoundError: the installation has lost the page's program.
@@ -57,12 +62,13 @@ def replay_html(replay: Replay) -> str:
     page = asset_directory("page")
     session = ReplaySession(replay)
     scene = Scene(session.level)
+    ghost = None if against is None else Ghost(against)
     frames = []
     for number in range(math.floor(session.moments_s[1] * RATE_HZ) + 1):
         session.seek(number / RATE_HZ)
-        frames.append(frame_bytes(session.frame(), scene))
+        frames.append(_frame(session, scene, ghost))
     session.seek(session.moments_s[1])
-    frames.append(frame_bytes(session.frame(), scene))
+    frames.append(_frame(session, scene, ghost))
     title = f"{session.level.title or session.level.name} - Roller"
     data = {
         "title": title,
@@ -82,15 +88,21 @@ def replay_html(replay: Replay) -> str:
     )
 
 
-def write_html(replay: Replay, file: str | os.PathLike[str]) -> Path:
+def write_html(replay: Replay, file: str | os.PathLike[str], against: Replay | None = None) -> Path:
     """Write a page that shows a replay, and return where it is.
 
     Raises:
         OSError: it cannot be written.
     """
     path = Path(file)
-    path.write_text(replay_html(replay), "utf-8")
+    path.write_text(replay_html(replay, against), "utf-8")
     return path
+
+
+def _frame(session: ReplaySession, scene: Scene, ghost: Ghost | None) -> bytes:
+    frame = session.frame()
+    beside = None if ghost is None else ghost.at(frame.result.time_s - session.intro_s)
+    return frame_bytes(frame, scene, beside)
 
 
 def _result(result: EpisodeResult) -> dict[str, object]:

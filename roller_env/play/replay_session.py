@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from roller_env.game.result import EpisodeResult
+from roller_env.game.step import INTRO_S
 from roller_env.level.schema import Level
 from roller_env.physics.presets import PhysicsPreset
 from roller_env.play.session import FASTEST, SLOWEST, GameFrame, Phase
@@ -22,6 +23,7 @@ class ReplaySession:
         phase: playing or paused.
         time_s: the moment shown, since the episode's start.
         speed: of the replay, of the clock's.
+        intro_s: how long after the episode's start the keys work, as recorded.
     """
 
     def __init__(self, replay: Replay):
@@ -29,6 +31,7 @@ class ReplaySession:
         self.phase = Phase.PLAYING
         self.time_s = 0.0
         self.speed = 1.0
+        self.intro_s = INTRO_S if replay.intro else 0.0
         self._playback = Playback(replay)
         # Played once, so that from now on every moment is near to one that is kept.
         self._playback.seek(len(self._playback))

@@ -114,6 +114,7 @@ class Room:
         agent: Autopilot | None = None,
         agent_name: str = "",
         crowd: Crowd | None = None,
+        rival: Replay | None = None,
         quality: Literal["high", "low"] = "high",
         skip_intro: bool = False,
     ) -> None:
@@ -130,6 +131,7 @@ class Room:
             agent: who plays until a key is held.
             agent_name: what pages call it.
             crowd: balls that play beside the game.
+            rival: the run whose ball rolls beside as a ghost, if no other one is chosen.
             quality: of the picture, as pages are told.
             skip_intro: whether the keys work at once, as pages are told.
         """
@@ -146,6 +148,7 @@ class Room:
         self._asking: list[Guest] = []
         self._held, self._tapped, self._told_s = "", "", 0.0
         self._ghost: Ghost | None = None
+        self._rival = rival
         self._ghost_kind: GhostKind = "none"
         self._ended: list[tuple[EpisodeResult, bool, Replay | None]] = []
         self._agent_told_s = 0.0
@@ -299,7 +302,7 @@ class Room:
         frame = self._played.frame()
         ghost = None
         if self._ghost is not None and frame.phase in (Phase.PLAYING, Phase.PAUSED, Phase.ENDED):
-            ghost = self._ghost.at(frame.result.time_s - frame.intro_s)
+            ghost = self._ghost.at(frame.result.time_s - self._played.intro_s)
         crowd = None if self._crowd is None else self._crowd.centres(frame.fraction)
         shown = frame_bytes(frame, self.scene, ghost, crowd, self.keeper.directory is not None)
         for guest in self._guests:
@@ -370,7 +373,7 @@ class Room:
         self._ghost_kind = kind
         game = self._played
 
-        replay = None
+        replay = self._rival
         if kind == "best":
             replay = self._of_records(lambda records: records.best_run(game.level, game.preset))
         elif kind == "par":

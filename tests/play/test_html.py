@@ -10,11 +10,14 @@ import struct
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from roller_env.cli.replay import main
+from roller_env.config import EnvConfig
 from roller_env.play.html import RATE_HZ, replay_html
-from roller_env.replay import Replay, load_replay, shipped_replays
+from roller_env.replay import Recorder, Replay, load_replay, shipped_replays
+from roller_env.simulation import Simulation
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +84,27 @@ def test_the_command_writes_it(tmp_path: Path, capsys: pytest.CaptureFixture[str
 def test_another_suffix_is_refused_before_anything_is_played(tmp_path: Path) -> None:
     with pytest.raises(SystemExit, match=r"must end in \.html or \.htm"):
         main(["flat", "--html", str(tmp_path / "flat.pdf")])
+
+
+def standing(seconds: float) -> Replay:
+    """Return a replay of flat in which nobody pushes."""
+    simulation = Simulation(EnvConfig(level="flat", physics="rigid"))
+    simulation.seed([np.random.default_rng(0)])
+    simulation.reset()
+    recorder = Recorder(simulation)
+    recorder.begin()
+    for _ in range(round(seconds / simulation.duration_s)):
+        simulation.step(np.zeros((1, 2)))
+        recorder.record(np.zeros((1, 2)))
+    return recorder.replay()
+
+
+def test_the_ball_of_another_replay_rolls_beside(replay: Replay) -> None:
+    data = data_of(replay_html(replay, standing(1.0)))
+    frames, size = unpacked(data["frames"]), data["frame_bytes"]
+    last = len(frames) - size
+    assert frames[last + 2] & 8
+    begun = struct.unpack_from("<3f", frames, 80)
+    assert struct.unpack_from("<3f", frames, last + 80) == pytest.approx(begun, abs=0.01)
+    x, began_x = (struct.unpack_from("<f", frames, at + 32)[0] for at in (last, 0))
+    assert x > began_x + 1.0
