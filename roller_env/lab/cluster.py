@@ -10,7 +10,6 @@ import json
 import os
 import pickle
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
@@ -22,6 +21,7 @@ from pathlib import Path
 from statistics import median
 from typing import Final
 
+import psutil
 import ray
 
 from roller_env.training import rllib
@@ -79,27 +79,11 @@ class Node:
 
     def kill(self) -> None:
         """End it as a power failure does: every process at once, none is asked."""
-        for process in [*_descendants(self._process.pid), self._process.pid]:
-            with suppress(ProcessLookupError):
-                os.kill(process, signal.SIGKILL)
+        begun = psutil.Process(self._process.pid)
+        for process in [*begun.children(recursive=True), begun]:
+            with suppress(psutil.NoSuchProcess):
+                process.kill()
         self._process.wait()
-
-
-def _descendants(process: int) -> list[int]:
-    """Return the numbers of all processes that a process has begun, and those have begun."""
-    parents: dict[int, int] = {}
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdecimal():
-            try:
-                # Behind the name, which may hold anything, are the state and the parent.
-                fields = (entry / "stat").read_text().rpartition(")")[2].split()
-            except OSError:
-                continue
-            parents[int(entry.name)] = int(fields[1])
-    found = [process]
-    for one in found:
-        found += [child for child, parent in parents.items() if parent == one]
-    return found[1:]
 
 
 @contextmanager
