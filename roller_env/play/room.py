@@ -175,14 +175,18 @@ class Room:
         self._woken.set()
 
     def leave(self, guest: Guest) -> None:
-        """Somebody goes; if it was the player, the game waits for the next one."""
+        """Somebody goes; if it was the player, the game waits, and who is next steers.
+
+        That is who has asked for it, or else who has been there longest: a page that is reloaded
+        may come before the one that it was is known to be gone.
+        """
         if guest not in self._guests:
             return
         self._guests.remove(guest)
         if guest in self._asking:
             self._asking.remove(guest)
         if guest is self._player:
-            self._seat_next(None)
+            self._seat_next(self._guests[0] if self._guests else None)
 
     def _seat_next(self, otherwise: Guest | None) -> None:
         """Give the controls to who has asked for them first; the game waits meanwhile."""

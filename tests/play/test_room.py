@@ -169,6 +169,23 @@ def test_a_game_waits_for_its_player_and_goes_on_after_a_reload() -> None:
     among(room, scene)
 
 
+def test_a_page_that_is_back_before_it_is_known_to_be_gone_steers_again() -> None:
+    room = played()
+
+    async def scene() -> None:
+        player = Somebody(room)
+        await started(player)
+        again = Somebody(room)
+        assert again.seat == "spectator"
+        room.leave(player)
+        assert again.seat == "player"
+        await until(lambda: bool(again.frames) and again.phase == PAUSED)
+        again.say('{"type":"resume"}')
+        await until(lambda: again.phase == PLAYING)
+
+    among(room, scene)
+
+
 def test_keys_of_which_nothing_is_heard_are_let_go(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("roller_env.play.room.KEYS_GO_STALE_S", 0.2)
     room = played()
