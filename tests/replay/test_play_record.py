@@ -80,7 +80,8 @@ def test_what_fails_while_it_is_played_costs_nothing_of_what_was_played(
             running = asyncio.create_task(room.run())
             player = Somebody(room)
             await started(player)
-            await push(player, lambda: player.x > 0.1)
+            begun = player.x
+            await push(player, lambda: player.x > begun + 0.1)
             running.cancel()
             await asyncio.gather(running, return_exceptions=True)
             room.close()
