@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from numba import config
-
 from roller_env.arrays import Int64
 from roller_env.compiled import inlined, spliced
 from roller_env.level.schema import PIECE_KINDS
@@ -26,16 +24,6 @@ def all_hooks(name: str) -> AllHooks:
     Compiled, it is that many calls: Numba cannot loop over functions of different types.
     """
     hooks: list[Hook] = [getattr(rules, name) for rules in RULES]
-
-    def call(now: Any, tables: tuple[Any, ...], states: tuple[Any, ...], owns: Int64) -> None:
-        for hook, table, state, own in zip(hooks, tables, states, owns, strict=True):
-            hook(now, table, state, Own(*own))
-
-    return call if config.DISABLE_JIT else _chain(hooks)  # type: ignore[attr-defined]
-
-
-def _chain(hooks: list[Hook]) -> AllHooks:
-    """Return a function, to be compiled, that calls the hooks in turn, each with its kind's own."""
     calls = [
         _only(inlined(hook), number, RULES[number].is_basic)
         for number, hook in enumerate(hooks)

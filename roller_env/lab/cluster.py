@@ -222,15 +222,19 @@ def trial(nodes: list[Node], training: Training, *, to_the_end: bool) -> list[Ro
         rows.append(Row(what, round(wait(what, happens), 1), "s"))
         print(f"{what}: {rows[-1].value} s", flush=True)
 
+    def both() -> bool:
+        return training.last("cluster/runners") == training.last("cluster/nodes") == 2
+
     training.start()
-    both = lambda: training.last("cluster/runners") == training.last("cluster/nodes") == 2  # noqa: E731
     after("from the start to an update by two runners on two nodes", both)
     kept = training.steps()
     after("three more updates", lambda: _updates(training, kept) >= 3)
     nodes.pop().kill()
     lost = training.steps()
-    one = lambda: training.last("cluster/runners") == 1 and _updates(training, lost) >= 3  # noqa: E731
-    after("from a node's death to three updates by the other", one)
+    after(
+        "from a node's death to three updates by the other",
+        lambda: training.last("cluster/runners") == 1 and _updates(training, lost) >= 3,
+    )
     nodes.append(Node(1))
     after("from a new node's start to an update by two runners on two nodes", both)
     wait("a checkpoint", training.files.checkpoint.exists)
@@ -239,9 +243,11 @@ def trial(nodes: list[Node], training: Training, *, to_the_end: bool) -> list[Ro
     before = read_progress(training.files.progress)
     kept_rows = [row for row in before if int(row[STEPS]) <= checkpoint]
     training.start()
-    # What was logged after the checkpoint is made again, with other times.
-    again = lambda: any(row not in before for row in training.rows())  # noqa: E731
-    after("from a killed driver's resumption to an update past its checkpoint", again)
+    after(
+        "from a killed driver's resumption to an update past its checkpoint",
+        # What was logged after the checkpoint is made again, with other times.
+        lambda: any(row not in before for row in training.rows()),
+    )
     if training.rows()[: len(kept_rows)] != kept_rows:
         raise TrialError("rows up to the checkpoint are not what they were")
     steps = [int(row[STEPS]) for row in training.rows()]

@@ -100,19 +100,20 @@ class Scene:
     @cached_property
     def content(self) -> bytes:
         """The scene as JSON, compressed by gzip: always the same bytes for the same level."""
-        data = {**self._data(), "hash": self.hash}
+        data = {**self._data, "hash": self.hash}
         return gzip.compress(_json(data).encode(), mtime=0)
 
     @cached_property
     def hash(self) -> str:
         """Of all that the scene is made of: scenes with the same one are the same."""
-        return hashlib.sha256(_json(self._data()).encode()).hexdigest()[:16]
+        return hashlib.sha256(_json(self._data).encode()).hexdigest()[:16]
 
     def _machine(self, piece: Piece, number: int, mover: Mover | None) -> Machine:
         if mover is None:
             return Machine(piece, number, -1, 0.0)
         return Machine(piece, number, self._mover_of[mover.name], mover.stop)
 
+    @cached_property
     def _data(self) -> dict[str, Any]:
         level, everything = self.level, expand(self.level)
         surfaces = _Surfaces()

@@ -32,7 +32,7 @@ def make() -> gym.Env[Any, Any]:
 def main() -> None:
     torch.manual_seed(0)
     env = make()
-    shape, actions = env.observation_space.shape, env.action_space.n  # type: ignore[attr-defined]
+    shape, actions = env.observation_space.shape, env.action_space.n
 
     def body() -> Net:
         return Net(state_shape=shape, hidden_sizes=(64, 64), activation=torch.nn.Tanh)

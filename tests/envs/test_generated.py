@@ -12,6 +12,7 @@ from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils.env_checker import check_env
 
 import roller_env
+from roller_env.envs.single import RollerEnv
 from roller_env.level.generate import VERSIONS, generate
 from roller_env.level.proved import proved_levels, read_verdicts, verdicts, write_verdicts
 from roller_env.solver import Search
@@ -54,7 +55,9 @@ def test_train_and_test_sets_are_ranges_of_seeds() -> None:
 def test_each_id_keeps_to_its_version_of_the_generator() -> None:
     for name, options in roller_env.GENERATED_IDS.items():
         env = gym.make(name, num_levels=2, disable_env_checker=True)
-        levels = env.unwrapped.simulation.levels  # type: ignore[attr-defined]
+        inner = env.unwrapped
+        assert isinstance(inner, RollerEnv)
+        levels = inner.simulation.levels
         assert list(levels) == proved_levels(2, version=options["version"])
         assert options["num_levels"] <= len(verdicts(options["version"])[0.25])
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -133,14 +134,13 @@ def cpu_speeds(asked: EnvConfig, seconds: float, ready: Callable[[], None]) -> I
         envs = RollerVectorEnv(_CPU_ENVS, num_threads=threads, **options)
         envs.reset(seed=0)
         envs.action_space.seed(0)
-        actions = [envs.action_space.sample() for _ in range(16)]
+        actions = itertools.cycle([envs.action_space.sample() for _ in range(16)])
         if threads == 1:
-            envs.step(actions[0])
+            envs.step(next(actions))
             ready()
-        count = iter(range(10**9))
 
-        def step(envs: RollerVectorEnv = envs, count: Iterator[int] = count) -> None:
-            envs.step(actions[next(count) % len(actions)])  # noqa: B023 - it is the same for all
+        def step(envs: RollerVectorEnv = envs, actions: Iterator[Any] = actions) -> None:
+            envs.step(next(actions))
 
         yield _timed("cpu", threads, _CPU_ENVS, step, seconds, lambda: None)
         threads *= 2
